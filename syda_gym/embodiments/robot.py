@@ -1,0 +1,280 @@
+"""Robot: a URDF with two arms, read by yourdfpy, its kinematics by pinocchio."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import yaml
+from numpy.typing import ArrayLike, NDArray
+
+from syda_gym.embodiments.arm_chain import ArmChain
+from syda_gym.embodiments.embodiment import SIDES, Embodiment, Feature, FloatArray, Side
+from syda_gym.embodiments.urdf import arm_chain, read_urdf
+from syda_gym.errors import EmbodimentError, nearest_name
+from syda_gym.files import fingerprint
+
+__all__ = ["ArmDescription", "CoupledLimit", "Robot", "RobotDescription"]
+
+
+@dataclass(frozen=True)
+class ArmDescription:
+    """Which links and joints of a URDF make one arm.
+
+    Attributes:
+        side: ``"left"`` or ``"right"``.
+        joints: revolute joints from shoulder to wrist, in order.
+        shoulder: link whose origin is the shoulder point.
+        elbow: link whose origin is the elbow point.
+        wrist: link whose origin is the wrist point.
+        tip: link whose origin ends the arm (for the workspace).
+    """
+
+    side: Side
+    joints: tuple[str, ...]
+    shoulder: str
+    elbow: str
+    wrist: str
+    tip: str
+
+
+@dataclass(frozen=True)
+class CoupledLimit:
+    """Limits of ``joint`` that depend on the angle of ``by``, linear between the rows ``at`` [rad]."""
+
+    joint: str
+    by: str
+    at: tuple[float, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """The small hand-editable YAML beside a URDF: everything that the URDF alone does not say."""
+
+    name: str
+    urdf: Path
+    torso: str
+    height: float
+    arms: tuple[ArmDescription, ...]
+    coupled_limits: tuple[CoupledLimit, ...] = ()
+    rest: Mapping[str, float] = field(default_factory=dict)
+    disabled_collisions: tuple[tuple[str, str], ...] = ()
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> RobotDescription:
+        """Reads a description from YAML.
+
+        Raises:
+            EmbodimentError: missing file, unknown or missing keys; the message names them.
+        """
+        file = Path(path)
+        if not file.is_file():
+            raise EmbodimentError(f"no robot description {file}; write one with `syda-gym robot add URDF`")
+        try:
+            data = yaml.safe_load(file.read_text(encoding="utf-8"))
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise EmbodimentError(f"{file} is not valid YAML: {error}") from error
+        needed = {"name", "urdf", "torso", "height", "arms"}
+        allowed = needed | {"coupled_limits", "rest", "disabled_collisions"}
+        if not isinstance(data, dict) or not needed <= set(data):
+            raise EmbodimentError(f"{file}: expected the keys {sorted(needed)}, got {data and sorted(data)}")
+        for key in set(data) - allowed:
+            raise EmbodimentError(f"{file}: unknown key {key!r}; {nearest_name(key, allowed)}")
+        try:
+            return cls(
+                name=str(data["name"]),
+                urdf=(file.parent / str(data["urdf"])).resolve(),
+                torso=str(data["torso"]),
+                height=float(data["height"]),
+                arms=tuple(ArmDescription(**{**a, "joints": tuple(a["joints"])}) for a in data["arms"]),
+                coupled_limits=tuple(
+                    CoupledLimit(c["joint"], c["by"], tuple(c["at"]), tuple(c["lower"]), tuple(c["upper"]))
+                    for c in data.get("coupled_limits") or ()
+                ),
+                rest={str(k): float(v) for k, v in (data.get("rest") or {}).items()},
+                disabled_collisions=tuple((a, b) for a, b in data.get("disabled_collisions") or ()),
+            )
+        except (TypeError, KeyError, ValueError) as error:
+            raise EmbodimentError(f"{file}: a wrong value or key: {error}; see docs for the format") from error
+
+
+class Robot(Embodiment):
+    """A robot whose frames are the joint angles [rad] of its arms, left arm first.
+
+    Args:
+        description: what the URDF is and which parts of it are arms.
+
+    Attributes:
+        joint_names: the columns of a frame.
+        lower: lower limits ``(n,)`` [rad].
+        upper: upper limits ``(n,)`` [rad].
+        speed: speed limits ``(n,)`` [rad/s].
+        effort: effort limits ``(n,)`` [N m].
+        chains: kinematics per arm, in the order of ``sides``.
+
+    Raises:
+        EmbodimentError: not a URDF, unknown joints or links, missing limits, arms of zero length.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self.description = description
+        self.name = description.name
+        self.height = description.height
+        arms = sorted(description.arms, key=lambda arm: SIDES.index(arm.side))
+        self.sides = tuple(arm.side for arm in arms)
+        if not arms or len(set(self.sides)) != len(arms):
+            raise EmbodimentError(f"robot {self.name!r}: describe one left and/or one right arm, got {self.sides}")
+        tree = read_urdf(description.urdf)
+        self.joint_names = tuple(joint for arm in arms for joint in arm.joints)
+        limits = tree.limits(self.joint_names)
+        self.lower, self.upper = limits.lower, limits.upper
+        self.speed, self.effort = limits.speed, limits.effort
+        self.features = tuple(Feature(name, "rad") for name in self.joint_names)
+        self.chains: tuple[ArmChain, ...] = tuple(
+            arm_chain(tree, description.torso, arm.side, arm.joints, (arm.shoulder, arm.elbow, arm.wrist, arm.tip))
+            for arm in arms
+        )
+        starts = np.cumsum([0, *[chain.n_joints for chain in self.chains]])
+        self.arm_slices = tuple(slice(int(a), int(b)) for a, b in zip(starts[:-1], starts[1:], strict=True))
+        self._coupled = tuple(
+            (self._column(c.joint), self._column(c.by), np.array(c.at), np.array(c.lower), np.array(c.upper))
+            for c in description.coupled_limits
+            if c.joint in self.joint_names and c.by in self.joint_names
+        )
+        self.rest = np.clip(
+            np.array([description.rest.get(name, 0.0) for name in self.joint_names]), self.lower, self.upper
+        )
+        lengths = self.arm_lengths
+        if not (lengths > 1e-4).all():
+            raise EmbodimentError(
+                f"robot {self.name!r}: upper arm and forearm must have a length, got {lengths.tolist()} m; "
+                "check the links named shoulder, elbow and wrist"
+            )
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Robot:
+        """Builds a robot from the YAML description at ``path``."""
+        return cls(RobotDescription.read(path))
+
+    @property
+    def kind(self) -> Literal["human", "robot"]:
+        """``"robot"``."""
+        return "robot"
+
+    @property
+    def urdf(self) -> Path:
+        """The URDF file."""
+        return self.description.urdf
+
+    @cached_property
+    def arm_lengths(self) -> FloatArray:
+        """Distances shoulder-elbow and elbow-wrist at the zero pose [m], ``(arms, 2)``."""
+        points = self.arm_points(np.zeros(len(self.joint_names)))[0]
+        return np.linalg.norm(np.diff(points, axis=1), axis=-1)
+
+    def arm_points(self, frames: ArrayLike) -> FloatArray:
+        """Shoulder, elbow and wrist of each arm, ``(N, arms, 3, 3)`` [m], torso frame."""
+        q = self.check(frames)
+        return np.stack(
+            [chain.points(q[:, part])[:, :3] for chain, part in zip(self.chains, self.arm_slices, strict=True)], axis=1
+        )
+
+    def limits_at(self, frames: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Joint limits that hold at each frame, coupled limits included.
+
+        Args:
+            frames: ``(N, n)`` [rad].
+
+        Returns:
+            Lower and upper limits, ``(N, n)`` each [rad].
+        """
+        q = np.atleast_2d(np.asarray(frames, dtype=np.float64))
+        lower, upper = np.repeat(self.lower[None], len(q), axis=0), np.repeat(self.upper[None], len(q), axis=0)
+        for joint, by, at, low, high in self._coupled:
+            lower[:, joint] = np.maximum(lower[:, joint], np.interp(q[:, by], at, low))
+            upper[:, joint] = np.minimum(upper[:, joint], np.interp(q[:, by], at, high))
+        return lower, upper
+
+    def clamp(self, frames: ArrayLike) -> FloatArray:
+        """Nearest frames within the joint limits, coupled limits included (the governing joint is clamped first)."""
+        q = np.clip(np.atleast_2d(np.asarray(frames, dtype=np.float64)), self.lower, self.upper)
+        lower, upper = self.limits_at(q)
+        return np.clip(q, lower, upper)
+
+    def violations(self, frames: ArrayLike, tolerance: float = 1e-9) -> NDArray[np.bool_]:
+        """Which joint angles lie outside their limits by more than ``tolerance`` [rad], ``(N, n)``."""
+        q = self.check(frames)
+        lower, upper = self.limits_at(q)
+        result: NDArray[np.bool_] = (q < lower - tolerance) | (q > upper + tolerance)
+        return result
+
+    def mirror(self, frames: ArrayLike) -> FloatArray:
+        """Left-right mirror image of the pose: arms swapped, signs by the mirrored joint axes.
+
+        Raises:
+            EmbodimentError: the robot has not two arms with the same joints.
+        """
+        q = self.check(frames)
+        return q[:, self._mirror_order] * self._mirror_signs
+
+    @cached_property
+    def _mirror_order(self) -> NDArray[np.intp]:
+        if len(self.chains) != 2 or self.chains[0].n_joints != self.chains[1].n_joints:
+            raise EmbodimentError(f"robot {self.name!r} has no left and right arm with equal joints to mirror")
+        count = self.chains[0].n_joints
+        return np.r_[count : 2 * count, 0:count].astype(np.intp)
+
+    @cached_property
+    def _mirror_signs(self) -> FloatArray:
+        # A reflection across y = 0 turns a rotation about (x, y, z) into one about (-x, y, -z).
+        left, right = (self._world_axes(chain) for chain in self.chains)
+        same = np.sum(left * np.array([-1.0, 1.0, -1.0]) * right, axis=1)
+        signs = np.where(same >= 0.0, 1.0, -1.0)
+        return np.tile(signs, 2)
+
+    @staticmethod
+    def _world_axes(chain: ArmChain) -> FloatArray:
+        rotation = np.eye(3)
+        axes = []
+        for fixed, axis in zip(chain.rotations, chain.axes, strict=True):
+            rotation = rotation @ fixed
+            axes.append(rotation @ axis)
+        return np.array(axes)
+
+    def _column(self, joint: str) -> int:
+        return self.joint_names.index(joint)
+
+    def spec(self) -> dict[str, Any]:
+        """Name, joints and a fingerprint of the kinematics, by which a stored mapping knows its robot again."""
+        numbers = b"".join(
+            np.round(np.concatenate([c.rotations.ravel(), c.offsets.ravel(), c.axes.ravel()]), 9).tobytes()
+            for c in self.chains
+        )
+        return {
+            "kind": "robot",
+            "name": self.name,
+            "joints": list(self.joint_names),
+            "kinematics": fingerprint(numbers, self.lower.tobytes(), self.upper.tobytes()),
+        }
+
+
+def select_sides(robot: Robot, sides: Sequence[Side]) -> RobotDescription:
+    """A description of the same robot with only some of its arms (for one-armed studies)."""
+    arms = tuple(arm for arm in robot.description.arms if arm.side in sides)
+    return RobotDescription(
+        name=f"{robot.name}-{'-'.join(sides)}",
+        urdf=robot.description.urdf,
+        torso=robot.description.torso,
+        height=robot.description.height,
+        arms=arms,
+        coupled_limits=robot.description.coupled_limits,
+        rest=robot.description.rest,
+        disabled_collisions=robot.description.disabled_collisions,
+    )

@@ -1,0 +1,81 @@
+"""The exceptions of the library: each says what was expected, what came and what to do."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+__all__ = [
+    "AgentError",
+    "EmbodimentError",
+    "MappingError",
+    "MissingExtraError",
+    "MotionError",
+    "OptionError",
+    "RouteError",
+    "StorageError",
+    "SydaError",
+    "TeleoperationError",
+    "nearest_name",
+]
+
+
+class SydaError(Exception):
+    """Root of every exception that this library raises on purpose."""
+
+
+class EmbodimentError(SydaError, ValueError):
+    """A body is unknown or unusable: no such name, not a URDF, no arm, missing limits."""
+
+
+class MotionError(SydaError, ValueError):
+    """A recording is missing or malformed; the message names the file and the frame, sheet or line."""
+
+
+class MappingError(SydaError, ValueError):
+    """A mapping cannot be fitted, inverted, chained or applied."""
+
+
+class RouteError(SydaError, ValueError):
+    """A route names unknown bodies, has a missing link, or does not exist."""
+
+
+class OptionError(SydaError, ValueError):
+    """An option has a value outside what is allowed; the message lists what is allowed."""
+
+
+class StorageError(SydaError, OSError):
+    """A stored file is missing, corrupt, of another version, or does not match its card."""
+
+
+class AgentError(SydaError, ValueError):
+    """An agent cannot act here: other robot, other observation layout, corrupt bundle."""
+
+
+class TeleoperationError(SydaError, RuntimeError):
+    """A live source, sink or packet is unusable."""
+
+
+class MissingExtraError(SydaError, ImportError):
+    """A feature needs an optional dependency; the message names the extra to install."""
+
+    def __init__(self, feature: str, extra: str) -> None:
+        super().__init__(f"{feature} needs an optional dependency: pip install 'syda-gym[{extra}]'")
+        self.feature = feature
+        self.extra = extra
+
+
+def nearest_name(name: str, known: Iterable[str]) -> str:
+    """Says which known name is nearest, for error messages.
+
+    Args:
+        name: what the user wrote.
+        known: the names that would have worked.
+
+    Returns:
+        A sentence such as ``did you mean 'pepper'? Known: adult, kid, pepper``.
+    """
+    names = sorted(known)
+    close = difflib.get_close_matches(name, names, n=1)
+    hint = f"did you mean {close[0]!r}? " if close else ""
+    return f"{hint}Known: {', '.join(names) or 'none'}"
