@@ -106,7 +106,8 @@ class ArmChain:
 
 def _turn(rotation: FloatArray, vector: FloatArray) -> FloatArray:
     """Rotates one constant vector by every rotation: (3, 3, N) x (3,) -> (3, N)."""
-    return rotation[:, 0] * vector[0] + rotation[:, 1] * vector[1] + rotation[:, 2] * vector[2]
+    turned: FloatArray = rotation[:, 0] * vector[0] + rotation[:, 1] * vector[1] + rotation[:, 2] * vector[2]
+    return turned
 
 
 def _multiply_constant(rotation: FloatArray, constant: FloatArray) -> FloatArray:
@@ -126,6 +127,4 @@ def _rotate(rotation: FloatArray, axis: FloatArray, angle: FloatArray) -> FloatA
         (x * y * rest - z * s, c + y * y * rest, z * y * rest + x * s),
         (x * z * rest + y * s, y * z * rest - x * s, c + z * z * rest),
     )
-    return np.stack(
-        [rotation[:, 0] * a + rotation[:, 1] * b + rotation[:, 2] * d for a, b, d in columns], axis=1
-    )
+    return np.stack([rotation[:, 0] * a + rotation[:, 1] * b + rotation[:, 2] * d for a, b, d in columns], axis=1)

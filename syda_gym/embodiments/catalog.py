@@ -10,6 +10,7 @@ from typing import Any
 
 from syda_gym.embodiments.embodiment import Embodiment
 from syda_gym.embodiments.human import HumanSkeleton
+from syda_gym.embodiments.parametric import PARAMETRIC_HUMANS
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import EmbodimentError, nearest_name
 from syda_gym.files import asset
@@ -108,3 +109,5 @@ register("adult", _adult)
 register("kid", _kid)
 register("pepper", lambda: Robot.read(asset("robots", "pepper.yaml")))
 register("nao", lambda: Robot.read(asset("robots", "nao.yaml")))
+for _name, _maker in PARAMETRIC_HUMANS.items():
+    register(_name, _maker)

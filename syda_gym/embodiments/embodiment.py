@@ -156,4 +156,5 @@ def landmark_error(body: Embodiment, predicted: ArrayLike, target: ArrayLike) ->
     second = body.landmarks(body.check(target, "target frames"))
     if first.shape != second.shape:
         raise EmbodimentError(f"{len(first)} predicted frames against {len(second)} target frames of {body.name!r}")
-    return np.linalg.norm(first - second, axis=-1)
+    distances: FloatArray = np.linalg.norm(first - second, axis=-1)
+    return distances

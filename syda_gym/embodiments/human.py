@@ -128,9 +128,7 @@ class HumanSkeleton(Embodiment):
         """Inverse of ``arm_points``: frames ``(N, F)`` from points ``(N, arms, 3, 3)`` in body axes [m]."""
         array = np.asarray(points, dtype=np.float64)
         if array.ndim != 4 or array.shape[1:] != (len(self.sides), 3, 3):
-            raise EmbodimentError(
-                f"points of {self.name!r}: expected (N, {len(self.sides)}, 3, 3), got {array.shape}"
-            )
+            raise EmbodimentError(f"points of {self.name!r}: expected (N, {len(self.sides)}, 3, 3), got {array.shape}")
         return (array @ self.axes).reshape(len(array), -1)
 
     def mirror(self, frames: ArrayLike) -> FloatArray:
@@ -169,7 +167,8 @@ class HumanSkeleton(Embodiment):
             outward = 0.5 * self.shoulders * (1.0 if side == "left" else -1.0)
             drops = np.array([0.0, self.upper_arm, self.upper_arm + self.forearm])
             points[0, index] = np.column_stack([np.zeros(3), np.full(3, outward), below - drops])
-        return self.frames_from_points(points)[0]
+        frame: FloatArray = self.frames_from_points(points)[0]
+        return frame
 
     def spec(self) -> dict[str, Any]:
         """A JSON-able description of this human."""

@@ -15,16 +15,17 @@ from syda_gym.errors import EmbodimentError
 __all__ = ["LimbIK"]
 
 _EXACT = 1e-7  # m; a closed-form solution nearer than this needs no refinement
-_STEPS = 25
+_STEPS = 60
 
 
 class LimbIK:
     """Inverse kinematics on limb directions.
 
-    Two joints point the upper arm and the next two point the forearm. Each is the second Paden-Kahan subproblem (Murray,
-    Li, Sastry, *A Mathematical Introduction to Robotic Manipulation*, 1994, section 3.2), solved in closed form. Where the
-    limits forbid the solution, or an arm's elbow is also moved by a third joint, a few projected Levenberg-Marquardt steps
-    bring elbow and wrist as near as the limits allow, in metres. Further joints (wrist) stay at rest.
+    Two joints point the upper arm and the next two point the forearm. Each is the second Paden-Kahan subproblem
+    (Murray, Li, Sastry, *A Mathematical Introduction to Robotic Manipulation*, 1994, section 3.2), solved in closed
+    form. Where the limits forbid the solution, or an arm's elbow is also moved by a third joint, projected
+    Levenberg-Marquardt steps bring elbow and wrist as near as the limits allow, in metres. Further joints (wrist) stay
+    at rest.
 
     Args:
         robot: whose arms.
@@ -32,9 +33,7 @@ class LimbIK:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self._arms = tuple(
-            _ArmIK(robot, index, chain) for index, chain in enumerate(robot.chains)
-        )
+        self._arms = tuple(_ArmIK(robot, index, chain) for index, chain in enumerate(robot.chains))
 
     def solve(self, directions: ArrayLike) -> FloatArray:
         """Joint angles whose limb directions are nearest to the wanted ones.
@@ -135,7 +134,7 @@ class _ArmIK:
     def _refine(self, frames: FloatArray, goal: FloatArray) -> FloatArray:
         """Projected Levenberg-Marquardt on elbow and wrist [m] over the joints that move them."""
         columns = np.array([self.part.start + joint for joint in self.movers])
-        damping = np.full(len(frames), 1e-6)
+        damping = np.full(len(frames), 1e-4)
         points, jacobian = self._relative_jacobian(frames[:, self.part])
         residual = points - goal
         cost = np.sum(residual**2, axis=1)
@@ -147,7 +146,8 @@ class _ArmIK:
             stuck = ((angles <= lower + 1e-12) & (gradient > 0)) | ((angles >= upper - 1e-12) & (gradient < 0))
             local = np.where(stuck[:, None, :], 0.0, local)
             normal = np.einsum("nij,nik->njk", local, local) + damping[:, None, None] * np.eye(len(columns))
-            step = np.linalg.solve(normal, -np.where(stuck, 0.0, gradient)[:, :, None])[:, :, 0]
+            gradient = np.where(stuck, 0.0, gradient)
+            step = np.linalg.solve(normal, -gradient[:, :, None])[:, :, 0]
             trial = frames.copy()
             trial[:, columns] += step
             trial = self.robot.clamp(trial)
@@ -155,13 +155,15 @@ class _ArmIK:
             new_residual = new_points - goal
             new_cost = np.sum(new_residual**2, axis=1)
             better = new_cost < cost
-            if not (cost - new_cost > 1e-12).any() and (damping > 1e-2).all():
+            if not (cost - new_cost > 1e-12).any() and (damping > 10.0).all():
                 break
             frames = np.where(better[:, None], trial, frames)
             jacobian = np.where(better[:, None, None], new_jacobian, jacobian)
             residual = np.where(better[:, None], new_residual, residual)
+            # Far from the goal Gauss-Newton overshoots; trust it more only where it delivers what it promises.
+            delivered = cost - new_cost > -0.5 * np.sum(gradient * step, axis=1)
+            damping = np.clip(np.where(better & delivered, damping * 0.2, damping * 5.0), 1e-7, 1e2)
             cost = np.where(better, new_cost, cost)
-            damping = np.clip(np.where(better, damping * 0.2, damping * 10.0), 1e-9, 1e2)
         return frames
 
     def _relative_points(self, frames: FloatArray) -> FloatArray:
@@ -196,7 +198,8 @@ def _rotations(axes: FloatArray, rest: FloatArray, movers: list[int]) -> FloatAr
 def _matrix(axis: FloatArray, angle: float) -> FloatArray:
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    rotation: FloatArray = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    return rotation
 
 
 def _subproblem_two(
@@ -220,7 +223,8 @@ def _subproblem_one(axis: FloatArray, start: FloatArray, goal: FloatArray) -> Fl
     """Angle about ``axis`` that turns ``start`` towards ``goal``."""
     a = start - (start @ axis)[:, None] * axis
     b = goal - (goal @ axis)[:, None] * axis
-    return np.arctan2(np.cross(a, b) @ axis, np.sum(a * b, axis=1))
+    angle: FloatArray = np.arctan2(np.cross(a, b) @ axis, np.sum(a * b, axis=1))
+    return angle
 
 
 def _turn_back(axis: FloatArray, angle: FloatArray, vectors: FloatArray) -> FloatArray:
@@ -232,8 +236,10 @@ def _turn_back(axis: FloatArray, angle: FloatArray, vectors: FloatArray) -> Floa
 def _into_range(angle: FloatArray, lower: float, upper: float) -> FloatArray:
     """Adds whole turns so that the angle falls into, or nearest to, its range."""
     middle = 0.5 * (lower + upper)
-    return middle + (angle - middle + np.pi) % (2.0 * np.pi) - np.pi
+    nearest: FloatArray = middle + (angle - middle + np.pi) % (2.0 * np.pi) - np.pi
+    return nearest
 
 
 def _unit(vector: FloatArray) -> FloatArray:
-    return vector / np.linalg.norm(vector)
+    unit: FloatArray = vector / np.linalg.norm(vector)
+    return unit

@@ -177,13 +177,15 @@ class Robot(Embodiment):
     def arm_lengths(self) -> FloatArray:
         """Distances shoulder-elbow and elbow-wrist at the zero pose [m], ``(arms, 2)``."""
         points = self.arm_points(np.zeros(len(self.joint_names)))[0]
-        return np.linalg.norm(np.diff(points, axis=1), axis=-1)
+        lengths: FloatArray = np.linalg.norm(np.diff(points, axis=1), axis=-1)
+        return lengths
 
     def arm_points(self, frames: ArrayLike) -> FloatArray:
         """Shoulder, elbow and wrist of each arm, ``(N, arms, 3, 3)`` [m], torso frame."""
         q = self.check(frames)
         return np.stack(
-            [chain.points(q[:, part])[:, :3] for chain, part in zip(self.chains, self.arm_slices, strict=True)], axis=1
+            [chain.points(q[:, part])[:, :3] for chain, part in zip(self.chains, self.arm_slices, strict=True)],
+            axis=1,
         )
 
     def limits_at(self, frames: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -196,7 +198,10 @@ class Robot(Embodiment):
             Lower and upper limits, ``(N, n)`` each [rad].
         """
         q = np.atleast_2d(np.asarray(frames, dtype=np.float64))
-        lower, upper = np.repeat(self.lower[None], len(q), axis=0), np.repeat(self.upper[None], len(q), axis=0)
+        lower, upper = (
+            np.repeat(self.lower[None], len(q), axis=0),
+            np.repeat(self.upper[None], len(q), axis=0),
+        )
         for joint, by, at, low, high in self._coupled:
             lower[:, joint] = np.maximum(lower[:, joint], np.interp(q[:, by], at, low))
             upper[:, joint] = np.minimum(upper[:, joint], np.interp(q[:, by], at, high))
@@ -229,7 +234,8 @@ class Robot(Embodiment):
         if len(self.chains) != 2 or self.chains[0].n_joints != self.chains[1].n_joints:
             raise EmbodimentError(f"robot {self.name!r} has no left and right arm with equal joints to mirror")
         count = self.chains[0].n_joints
-        return np.r_[count : 2 * count, 0:count].astype(np.intp)
+        order: NDArray[np.intp] = np.r_[count : 2 * count, 0:count].astype(np.intp)
+        return order
 
     @cached_property
     def _mirror_signs(self) -> FloatArray:

@@ -65,7 +65,12 @@ class UrdfTree:
             raise EmbodimentError(
                 f"{self.path.name}: joint {name!r} has lower limit {limit.lower} not below upper {limit.upper}"
             )
-        return float(limit.lower), float(limit.upper), float(limit.velocity or np.inf), float(limit.effort or np.inf)
+        return (
+            float(limit.lower),
+            float(limit.upper),
+            float(limit.velocity or np.inf),
+            float(limit.effort or np.inf),
+        )
 
     def path_to(self, ancestor: str, link: str) -> list[str] | None:
         """Joint names from ``ancestor`` down to ``link``, or ``None`` if ``ancestor`` is not above it."""

@@ -31,6 +31,7 @@ class MotionClip:
         recording: name of the recording that it was cut from.
         mirrored: whether it is the left-right mirror image of a recorded clip.
         filled: ``(N, F)`` marks values that were gaps and have been filled; ``None`` if there were none.
+        timestamps: ``(N,)`` [s] as recorded, increasing; ``None`` if frames are evenly spaced by ``fps``.
     """
 
     body: Embodiment
@@ -40,11 +41,20 @@ class MotionClip:
     recording: str
     mirrored: bool = False
     filled: NDArray[np.bool_] | None = None
+    timestamps: FloatArray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "frames", _checked(self.body, self.frames, self.recording))
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise MotionError(f"{self.recording}: fps must be positive, got {self.fps}")
+        if self.filled is not None and self.filled.shape != self.frames.shape:
+            raise MotionError(
+                f"{self.recording}: filled has shape {self.filled.shape}, frames {self.frames.shape}; they must agree"
+            )
+        if self.timestamps is not None and np.shape(self.timestamps) != (len(self.frames),):
+            raise MotionError(
+                f"{self.recording}: {np.size(self.timestamps)} timestamps for {len(self.frames)} frames"
+            )
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -88,6 +98,8 @@ class Take:
         fps: frames per second.
         frames: body name to ``(N, F)``, all with the same N.
         mirrored: whether it is the left-right mirror of another take of the same recording.
+        filled: body name to ``(N, F)``, true where a gap has been filled; bodies without gaps are left out.
+        timestamps: ``(N,)`` [s] as recorded, where a recording has them; ``fps`` is then their mean rate.
     """
 
     recording: str
@@ -95,6 +107,8 @@ class Take:
     fps: float
     frames: Mapping[str, FloatArray]
     mirrored: bool = False
+    filled: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    timestamps: FloatArray | None = None
 
 
 class PairedMotions:
@@ -238,19 +252,18 @@ class PairedMotions:
         """The rows as clips in time order, one per recording and half (never across the mirror seam)."""
         result = []
         for rows in self.clip_rows():
-            first = rows[0]
-            common = {
-                "fps": self.fps,
-                "action": str(self.actions[first]),
-                "recording": str(self.recordings[first]),
-                "mirrored": bool(self.mirrored[first]),
-            }
-            result.append(
-                PairedClip(
-                    MotionClip(self.source_body, self.source[rows], **common),
-                    MotionClip(self.target_body, self.target[rows], **common),
+            source, target = (
+                MotionClip(
+                    body,
+                    frames[rows],
+                    self.fps,
+                    str(self.actions[rows[0]]),
+                    str(self.recordings[rows[0]]),
+                    bool(self.mirrored[rows[0]]),
                 )
+                for body, frames in ((self.source_body, self.source), (self.target_body, self.target))
             )
+            result.append(PairedClip(source, target))
         return tuple(result)
 
     def clip_rows(self) -> tuple[NDArray[np.intp], ...]:
@@ -369,7 +382,14 @@ class Motions:
 
     def _clip(self, take: Take, body: str) -> MotionClip:
         return MotionClip(
-            self.bodies[body], take.frames[body], take.fps, take.action, take.recording, take.mirrored
+            self.bodies[body],
+            take.frames[body],
+            take.fps,
+            take.action,
+            take.recording,
+            take.mirrored,
+            take.filled.get(body),
+            take.timestamps,
         )
 
 
