@@ -1,0 +1,1 @@
+"""WHO acts: classical filters, learned predictors and residual policies under one interface."""
