@@ -28,8 +28,9 @@ class ArmChain:
         axes: ``(n, 3)``.
         lower: lower joint limits ``(n,)`` [rad].
         upper: upper joint limits ``(n,)`` [rad].
-        point_joints: index of the joint that carries shoulder, elbow, wrist and tip; -1 for the torso.
-        point_offsets: ``(4, 3)`` [m].
+        point_joints: index of the joint that carries shoulder, elbow, wrist and tip; -1 for the torso. Other points may
+            ride on a copy made with ``dataclasses.replace``, for example the ends of collision capsules.
+        point_offsets: ``(P, 3)`` [m], one per entry of ``point_joints``.
     """
 
     side: Side
@@ -39,7 +40,7 @@ class ArmChain:
     axes: FloatArray
     lower: FloatArray
     upper: FloatArray
-    point_joints: tuple[int, int, int, int]
+    point_joints: tuple[int, ...]
     point_offsets: FloatArray
 
     @property
@@ -48,24 +49,24 @@ class ArmChain:
         return len(self.joints)
 
     def points(self, angles: ArrayLike) -> FloatArray:
-        """Shoulder, elbow, wrist and tip.
+        """Shoulder, elbow, wrist and tip (or whatever points ride on this chain).
 
         Args:
             angles: ``(N, n)`` [rad].
 
         Returns:
-            ``(N, 4, 3)`` [m] in the torso frame.
+            ``(N, P, 3)`` [m] in the torso frame, ``P`` = 4.
         """
         return self._sweep(np.asarray(angles, dtype=np.float64), with_axes=False)[0]
 
     def jacobians(self, angles: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Positions of the four points and their derivatives with respect to every joint.
+        """Positions of the points and their derivatives with respect to every joint.
 
         Args:
             angles: ``(N, n)`` [rad].
 
         Returns:
-            Points ``(N, 4, 3)`` [m] and Jacobians ``(N, 4, 3, n)`` [m/rad].
+            Points ``(N, P, 3)`` [m] and Jacobians ``(N, P, 3, n)`` [m/rad].
         """
         q = np.asarray(angles, dtype=np.float64)
         points, origins, directions = self._sweep(q, with_axes=True)
@@ -80,7 +81,7 @@ class ArmChain:
         # Component-major (3, 3, N): each scalar operation runs over a contiguous row of samples.
         rotation = np.repeat(np.eye(3)[:, :, None], count, axis=2)
         position = np.zeros((3, count))
-        points = np.zeros((4, 3, count))
+        points = np.zeros((len(self.point_joints), 3, count))
         origins = np.zeros((self.n_joints, 3, count))
         directions = np.zeros((self.n_joints, 3, count))
         self._place_points(-1, rotation, position, points)
