@@ -1,0 +1,169 @@
+"""Confidence: how wrong a mapping may be, and how unlike its training a frame is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Dict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syda_gym.embodiments.embodiment import Embodiment, FloatArray
+from syda_gym.mappings.scaling import Scaler
+
+__all__ = ["Confidence", "action_maximum", "fit_confidence", "gain"]
+
+_ANCHORS = 200
+_QUANTILE = 0.9
+_FAMILIAR = 0.99
+
+
+class Confidence:
+    """An error bound [m] and a Gaussian-process style difficulty.
+
+    The bound is constant: the largest over the training actions of each action's own 90 % quantile of the mean landmark
+    error, every action predicted by a model that never saw it (``action_maximum``). A pooled quantile covers hard
+    actions badly, because errors differ between actions more than within them.
+
+    The difficulty of a frame is 1 - k(frame, nearest anchor), k being a Gaussian kernel on standardised codes and the
+    anchors a spread-out subset of the training codes. Frames beyond the 99 % quantile of what held-out actions show are
+    out of distribution.
+
+    Args:
+        bound: error bound [m], ``None`` where no action could be held out.
+        gain: how much the mapping enlarges small landmark displacements.
+        scale: standardisation of codes.
+        anchors: ``(A, D)`` standardised codes.
+        width: of the kernel, in standardised units.
+        threshold: difficulty above which a frame is out of distribution.
+    """
+
+    def __init__(
+        self,
+        bound: float | None,
+        gain: float,
+        scale: Scaler,
+        anchors: FloatArray,
+        width: float,
+        threshold: float,
+    ) -> None:
+        self.bound = bound
+        self.gain = gain
+        self.scale = scale
+        self.anchors = anchors
+        self.width = width
+        self.threshold = threshold
+
+    def difficulty(self, codes: FloatArray) -> FloatArray:
+        """Difficulty 0 to 1 of codes ``(N, K, D)``: the worst of the K, ``(N,)``."""
+        distance = _nearest(self.scale(codes).reshape(-1, codes.shape[-1]), self.anchors)
+        values: FloatArray = 1.0 - np.exp(-0.5 * (distance / self.width) ** 2)
+        worst: FloatArray = values.reshape(codes.shape[:-1]).max(axis=-1)
+        return worst
+
+    def unfamiliar(self, codes: FloatArray) -> NDArray[np.bool_]:
+        """Which frames are out of distribution, ``(N,)``."""
+        result: NDArray[np.bool_] = self.difficulty(codes) > self.threshold
+        return result
+
+    def arrays(self, name: str) -> dict[str, FloatArray]:
+        """The fitted arrays under ``name.``."""
+        return {f"{name}.anchors": self.anchors, **self.scale.arrays(f"{name}.scale")}
+
+    def settings(self) -> dict[str, Any]:
+        """The fitted numbers, JSON-able."""
+        return {"bound": self.bound, "gain": self.gain, "width": self.width, "threshold": self.threshold}
+
+    @classmethod
+    def restore(cls, settings: dict[str, Any], arrays: Dict[str, FloatArray], name: str) -> Confidence:
+        """Rebuilds what ``settings`` and ``arrays`` gave."""
+        bound = settings["bound"]
+        return cls(
+            None if bound is None else float(bound),
+            float(settings["gain"]),
+            Scaler.restore(arrays, f"{name}.scale"),
+            arrays[f"{name}.anchors"],
+            float(settings["width"]),
+            float(settings["threshold"]),
+        )
+
+
+def fit_confidence(codes: FloatArray, actions: NDArray[np.str_], bound: float | None, enlargement: float) -> Confidence:
+    """Fits the difficulty to training codes and attaches the bound.
+
+    Args:
+        codes: ``(N, K, D)``.
+        actions: ``(N,)``.
+        bound: error bound [m].
+        enlargement: see ``gain``.
+    """
+    rows = codes.reshape(-1, codes.shape[-1])
+    labels = np.repeat(actions, codes.shape[1])
+    scale = Scaler.fit(rows)
+    standard = scale(rows)
+    anchors = _spread_out(standard, _ANCHORS)
+    names = np.unique(labels)
+    if len(names) > 1:
+        held_out = np.concatenate(
+            [_nearest(standard[labels == name], _spread_out(standard[labels != name], _ANCHORS)) for name in names]
+        )
+    else:
+        held_out = _nearest(standard, anchors)
+    width = max(float(np.median(held_out)), 1e-3)
+    far = float(np.quantile(held_out, _FAMILIAR))
+    threshold = float(1.0 - np.exp(-0.5 * (max(far, 1e-3) / width) ** 2))
+    return Confidence(bound, enlargement, scale, anchors, width, min(threshold, 1.0 - 1e-9))
+
+
+def action_maximum(errors: FloatArray, actions: NDArray[np.str_]) -> float:
+    """The largest of the actions' own 90 % quantiles.
+
+    Args:
+        errors: ``(N,)`` mean landmark errors [m] of held-out predictions.
+        actions: ``(N,)``.
+
+    Returns:
+        The bound [m].
+    """
+    return max(float(np.quantile(errors[actions == name], _QUANTILE)) for name in np.unique(actions))
+
+
+def gain(source: Embodiment, target: Embodiment, frames: FloatArray, mapped: FloatArray) -> float:
+    """How much a mapping enlarges small displacements: median ratio of landmark distances between like frames.
+
+    Args:
+        source: body of ``frames``.
+        target: body of ``mapped``.
+        frames: ``(N, F_source)``.
+        mapped: ``(N, F_target)``, the mapped frames.
+    """
+    count = min(len(frames), 400)
+    rows = np.linspace(0, len(frames) - 1, count).astype(int)
+    before, after = source.landmarks(frames[rows]), target.landmarks(mapped[rows])
+    moved = np.linalg.norm(before[:, None] - before[None], axis=-1).mean(axis=-1)
+    result = np.linalg.norm(after[:, None] - after[None], axis=-1).mean(axis=-1)
+    near = (moved > 0.02) & (moved < 0.15)
+    return float(np.median(result[near] / moved[near])) if near.sum() >= 10 else target.reach / source.reach
+
+
+def _nearest(rows: FloatArray, anchors: FloatArray) -> FloatArray:
+    """Distance of each row to the nearest anchor."""
+    result = np.empty(len(rows))
+    squares = np.sum(anchors**2, axis=1)
+    for start in range(0, len(rows), 4096):
+        part = rows[start : start + 4096]
+        distance = np.sum(part**2, axis=1)[:, None] + squares - 2.0 * part @ anchors.T
+        result[start : start + 4096] = np.sqrt(np.maximum(distance.min(axis=1), 0.0))
+    return result
+
+
+def _spread_out(rows: FloatArray, count: int) -> FloatArray:
+    """Farthest-point subset: starts at the row nearest to the mean and adds the row farthest from those chosen."""
+    if len(rows) > 4000:
+        rows = rows[:: -(-len(rows) // 4000)]
+    chosen = [int(np.argmin(np.sum((rows - rows.mean(axis=0)) ** 2, axis=1)))]
+    distance = np.sum((rows - rows[chosen[0]]) ** 2, axis=1)
+    while len(chosen) < min(count, len(rows)) and distance.max() > 1e-12:
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.sum((rows - rows[chosen[-1]]) ** 2, axis=1))
+    return rows[chosen]

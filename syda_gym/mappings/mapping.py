@@ -1,0 +1,145 @@
+"""Mapping: a function from frames of one body to frames of another."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from syda_gym.embodiments.embodiment import Embodiment, FloatArray
+from syda_gym.embodiments.robot import Robot
+from syda_gym.errors import MappingError
+from syda_gym.mappings.card import MappingCard
+from syda_gym.mappings.limits import limit_speed
+
+if TYPE_CHECKING:
+    from syda_gym.mappings.chain import ChainMapping
+
+__all__ = ["Mapping"]
+
+
+class Mapping(ABC):
+    """Takes raw frames of ``source`` and gives raw frames of ``target``.
+
+    A mapping carries its own calibration, scaling and encoding. Joint angles that it returns always obey the
+    robot's joint limits, coupled ones included.
+
+    Attributes:
+        source: the body whose frames it takes.
+        target: the body whose frames it gives.
+    """
+
+    source: Embodiment
+    target: Embodiment
+
+    @property
+    @abstractmethod
+    def card(self) -> MappingCard:
+        """Where the mapping comes from."""
+
+    @property
+    def method(self) -> str:
+        """Name of the method, as in ``fitting.METHODS``."""
+        return self.card.method
+
+    @property
+    def preset(self) -> str:
+        """Preset of the method."""
+        return self.card.preset
+
+    @property
+    def route(self) -> tuple[str, ...]:
+        """Names of the bodies that motion passes, source and target included."""
+        return (self.source.name, self.target.name)
+
+    @abstractmethod
+    def raw(self, frames: FloatArray) -> FloatArray:
+        """Maps without enforcing joint limits (for counting violations).
+
+        Args:
+            frames: ``(N, F_source)``, already checked.
+
+        Returns:
+            ``(N, F_target)``.
+        """
+
+    @abstractmethod
+    def inverse(self) -> Mapping:
+        """The mapping from ``target`` to ``source`` by the same model.
+
+        Raises:
+            MappingError: the model has no inverse.
+        """
+
+    @abstractmethod
+    def error_bound(self, frames: ArrayLike) -> FloatArray:
+        """A bound on the mean landmark error of each frame [m], see ``confidence.Confidence``.
+
+        Args:
+            frames: ``(N, F_source)`` or ``(F_source,)``.
+
+        Returns:
+            ``(N,)`` [m].
+
+        Raises:
+            MappingError: the mapping was fitted without a bound.
+        """
+
+    @abstractmethod
+    def difficulty(self, frames: ArrayLike) -> FloatArray:
+        """How far each frame lies from the frames of the fit: 0 (familiar) to 1 (unlike all), ``(N,)``.
+
+        It ranks frames within an action; it is a warning light, not a scale for the bound.
+        """
+
+    @abstractmethod
+    def unfamiliar(self, frames: ArrayLike) -> NDArray[np.bool_]:
+        """Which frames are out of the distribution of the fit, ``(N,)``."""
+
+    def __call__(self, frames: ArrayLike) -> FloatArray:
+        """Maps frames.
+
+        Args:
+            frames: ``(N, F_source)`` or one frame ``(F_source,)``.
+
+        Returns:
+            ``(N, F_target)`` or ``(F_target,)``, within the target's joint limits.
+
+        Raises:
+            EmbodimentError: the frames are not frames of ``source``, or hold values that are not finite.
+        """
+        result = self._within_limits(self.raw(self.source.check(frames)))
+        return result[0] if np.ndim(frames) == 1 else result
+
+    def sequence(self, frames: ArrayLike, fps: float) -> FloatArray:
+        """Maps a motion and limits the joint speeds causally.
+
+        A motion within the speed limits passes unchanged, without any lag.
+
+        Args:
+            frames: ``(N, F_source)`` in time order, one clip.
+            fps: frames per second.
+
+        Returns:
+            ``(N, F_target)`` within joint limits and joint speed limits.
+        """
+        mapped = self(np.atleast_2d(np.asarray(frames, dtype=np.float64)))
+        return limit_speed(self.target, mapped, fps) if isinstance(self.target, Robot) else mapped
+
+    def __rshift__(self, after: Mapping) -> ChainMapping:
+        """``a >> b``: the chain that applies ``a``, then ``b``."""
+        from syda_gym.mappings.chain import ChainMapping
+
+        if not isinstance(after, Mapping):
+            return NotImplemented
+        return ChainMapping((self, after))
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({' > '.join(self.route)}, method={self.method!r}, preset={self.preset!r})"
+
+    def _within_limits(self, frames: FloatArray) -> FloatArray:
+        if not np.isfinite(frames).all():
+            raise MappingError(f"{self!r} gave values that are not finite; fit it again on more varied frames")
+        return self.target.clamp(frames) if isinstance(self.target, Robot) else frames

@@ -1,0 +1,139 @@
+"""Regressors: from codes of one body to codes of another, with an inverse where the model has one."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.errors import MappingError
+from syda_gym.mappings.networks import Stack, stacks_from_arrays
+from syda_gym.mappings.scaling import Scaler
+
+__all__ = ["DirectRegressor", "DualRegressor", "Regressor"]
+
+Arrays = dict[str, FloatArray]
+
+
+class Regressor(ABC):
+    """A fitted function from codes ``(..., D_source)`` to codes ``(..., D_target)``."""
+
+    kind: ClassVar[str]
+
+    @abstractmethod
+    def __call__(self, codes: FloatArray) -> FloatArray:
+        """Maps codes."""
+
+    def inverse(self) -> Regressor:
+        """The regressor from target codes to source codes.
+
+        Raises:
+            MappingError: this model has no inverse.
+        """
+        raise MappingError(
+            f"a {self.kind!r} model has no inverse; fit the reversed pair (pair.reversed()), or use method='syda', "
+            "whose models map both ways"
+        )
+
+    @abstractmethod
+    def arrays(self) -> Arrays:
+        """Fitted numbers, for storage."""
+
+    def settings(self) -> dict[str, Any]:
+        """JSON-able settings, for storage."""
+        return {}
+
+    @classmethod
+    @abstractmethod
+    def restore(cls, settings: dict[str, Any], arrays: Arrays) -> Regressor:
+        """Rebuilds what ``settings`` and ``arrays`` describe."""
+
+
+class DualRegressor(Regressor):
+    """SyDa: two autoencoders with shared latent features; A's encoder followed by B's decoder, or the other way.
+
+    Args:
+        stacks: ``encode_a``, ``decode_a``, ``encode_b``, ``decode_b``.
+        scale_a: standardisation of A's codes.
+        scale_b: standardisation of B's codes.
+    """
+
+    kind = "syda"
+    names: ClassVar[tuple[str, ...]] = ("encode_a", "decode_a", "encode_b", "decode_b")
+
+    def __init__(self, stacks: dict[str, Stack], scale_a: Scaler, scale_b: Scaler) -> None:
+        self.stacks = stacks
+        self.scale_a = scale_a
+        self.scale_b = scale_b
+
+    def __call__(self, codes: FloatArray) -> FloatArray:
+        """Encodes with A, decodes with B."""
+        return self.scale_b.undo(self.stacks["decode_b"](self.synergies(codes)))
+
+    def synergies(self, codes: FloatArray) -> FloatArray:
+        """The latent features (synergies) of A's codes."""
+        return self.stacks["encode_a"](self.scale_a(codes))
+
+    def reconstruct(self, codes: FloatArray) -> FloatArray:
+        """A's codes through A's own autoencoder."""
+        return self.scale_a.undo(self.stacks["decode_a"](self.synergies(codes)))
+
+    def inverse(self) -> DualRegressor:
+        """The same model with A and B exchanged."""
+        swapped = {"encode_a": "encode_b", "decode_a": "decode_b", "encode_b": "encode_a", "decode_b": "decode_a"}
+        return type(self)({name: self.stacks[swapped[name]] for name in self.names}, self.scale_b, self.scale_a)
+
+    def arrays(self) -> Arrays:
+        """Weights, biases and scales."""
+        return _network_arrays(self.stacks, self.scale_a, self.scale_b)
+
+    def settings(self) -> dict[str, Any]:
+        """The activation."""
+        encoder = self.stacks["encode_a"]
+        return {"slope": encoder.slope, "activated": encoder.activated}
+
+    @classmethod
+    def restore(cls, settings: dict[str, Any], arrays: Arrays) -> DualRegressor:
+        """Rebuilds the model."""
+        stacks = stacks_from_arrays(arrays, cls.names, float(settings["slope"]), bool(settings["activated"]))
+        if set(stacks) != set(cls.names):
+            raise MappingError(f"expected the networks {', '.join(cls.names)}, got {', '.join(stacks) or 'none'}")
+        return cls(stacks, Scaler.restore(arrays, "scale_a"), Scaler.restore(arrays, "scale_b"))
+
+
+class DirectRegressor(Regressor):
+    """The direct autoencoder of the paper's comparison: A's encoder and B's decoder, trained on A-to-B alone."""
+
+    kind = "direct"
+    names: ClassVar[tuple[str, ...]] = ("encode_a", "decode_b")
+
+    def __init__(self, stacks: dict[str, Stack], scale_a: Scaler, scale_b: Scaler) -> None:
+        self.stacks = stacks
+        self.scale_a = scale_a
+        self.scale_b = scale_b
+
+    def __call__(self, codes: FloatArray) -> FloatArray:
+        """Encodes and decodes."""
+        return self.scale_b.undo(self.stacks["decode_b"](self.stacks["encode_a"](self.scale_a(codes))))
+
+    def arrays(self) -> Arrays:
+        """Weights, biases and scales."""
+        return _network_arrays(self.stacks, self.scale_a, self.scale_b)
+
+    def settings(self) -> dict[str, Any]:
+        """The activation."""
+        encoder = self.stacks["encode_a"]
+        return {"slope": encoder.slope, "activated": encoder.activated}
+
+    @classmethod
+    def restore(cls, settings: dict[str, Any], arrays: Arrays) -> DirectRegressor:
+        """Rebuilds the model."""
+        stacks = stacks_from_arrays(arrays, cls.names, float(settings["slope"]), bool(settings["activated"]))
+        if set(stacks) != set(cls.names):
+            raise MappingError(f"expected the networks {', '.join(cls.names)}, got {', '.join(stacks) or 'none'}")
+        return cls(stacks, Scaler.restore(arrays, "scale_a"), Scaler.restore(arrays, "scale_b"))
+
+
+def _network_arrays(stacks: dict[str, Stack], scale_a: Scaler, scale_b: Scaler) -> Arrays:
+    result = {key: value for name, stack in stacks.items() for key, value in stack.arrays(name).items()}
+    return {**result, **scale_a.arrays("scale_a"), **scale_b.arrays("scale_b")}
