@@ -52,9 +52,7 @@ class MotionClip:
                 f"{self.recording}: filled has shape {self.filled.shape}, frames {self.frames.shape}; they must agree"
             )
         if self.timestamps is not None and np.shape(self.timestamps) != (len(self.frames),):
-            raise MotionError(
-                f"{self.recording}: {np.size(self.timestamps)} timestamps for {len(self.frames)} frames"
-            )
+            raise MotionError(f"{self.recording}: {np.size(self.timestamps)} timestamps for {len(self.frames)} frames")
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -349,9 +347,7 @@ class Motions:
     def pairs(self) -> tuple[tuple[str, str], ...]:
         """Unordered pairs of bodies that share a take, each sorted by the order of ``bodies``."""
         order = {name: index for index, name in enumerate(self.bodies)}
-        found = {
-            (a, b) for take in self.takes for a in take.frames for b in take.frames if order[a] < order[b]
-        }
+        found = {(a, b) for take in self.takes for a in take.frames for b in take.frames if order[a] < order[b]}
         return tuple(sorted(found, key=lambda pair: (order[pair[0]], order[pair[1]])))
 
     def pair(self, source: str, target: str) -> PairedMotions:

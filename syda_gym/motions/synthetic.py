@@ -114,9 +114,7 @@ def _chosen(actions: Sequence[str] | None, families: Sequence[str] | None) -> li
     return chosen
 
 
-def _take(
-    performers: Sequence[Performer], action: Action, variant: int, seed: int, tempo: float, fps: float
-) -> Take:
+def _take(performers: Sequence[Performer], action: Action, variant: int, seed: int, tempo: float, fps: float) -> Take:
     recording = f"{action.name}-{variant + 1:02d}"
     score = _score(action, variant, seed, tempo)
     frames: dict[str, FloatArray] = {}

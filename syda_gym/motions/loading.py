@@ -1,0 +1,144 @@
+"""``load_motions``: one door for every source of motions, named by ``format:PATH`` or found by looking into the file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from syda_gym.errors import MotionError, OptionError, nearest_name
+from syda_gym.files import asset
+from syda_gym.motions.clip import Motions, Take
+from syda_gym.motions.readers.npz import read_npz
+from syda_gym.motions.readers.paper import read_paper
+
+__all__ = ["FORMATS", "Format", "load_motions", "resampled"]
+
+
+@dataclass(frozen=True)
+class Format:
+    """One kind of recording.
+
+    Attributes:
+        name: the prefix in ``format:PATH``.
+        description: one line for people.
+        read: from a path to motions, at the recording's own frame rate.
+        matches: whether a path looks like this format, by ending and content.
+    """
+
+    name: str
+    description: str
+    read: Callable[[Path], Motions]
+    matches: Callable[[Path], bool]
+
+
+def load_motions(spec: str | os.PathLike[str] | Motions = "embedded", fps: float | None = None) -> Motions:
+    """Loads motions.
+
+    Args:
+        spec: ``"embedded"`` (synthetic, shipped), ``"format:PATH"`` such as ``"paper:DIR"``, a path whose format is
+            found by looking into it, or motions, which are returned as they are.
+        fps: frames per second. Recordings without timestamps (the paper's) are taken to have this rate; all others are
+            resampled to it. By default the recording's own rate, 10 Hz for the paper's.
+
+    Returns:
+        The motions.
+
+    Raises:
+        MotionError: unknown format, or the recording is missing or malformed.
+        OptionError: ``fps`` is not positive.
+    """
+    if fps is not None and not (np.isfinite(fps) and 0.0 < fps <= 1000.0):
+        raise OptionError(f"fps must be between 0 and 1000, got {fps}")
+    if isinstance(spec, Motions):
+        return spec if fps is None else resampled(spec, fps)
+    text = os.fspath(spec)
+    if text == "embedded":
+        return _embedded() if fps is None else resampled(_embedded(), fps)
+    chosen, path = _format_and_path(text)
+    if chosen.name == "paper" and fps is not None:
+        return read_paper(path, fps)
+    motions = chosen.read(path)
+    return motions if fps is None else resampled(motions, fps)
+
+
+def resampled(motions: Motions, fps: float) -> Motions:
+    """The same motions at another frame rate, by linear interpolation in time (recorded timestamps are honoured).
+
+    Args:
+        motions: what to resample.
+        fps: new frames per second.
+
+    Returns:
+        New motions; a value counts as filled if either of its neighbours was. Takes that already have the rate and no
+        timestamps stay as they are.
+    """
+    return replace(motions, takes=tuple(_resampled(take, fps) for take in motions.takes))
+
+
+def _resampled(take: Take, fps: float) -> Take:
+    if take.timestamps is None and take.fps == fps:
+        return take
+    count = len(next(iter(take.frames.values())))
+    times = np.arange(count) / take.fps if take.timestamps is None else take.timestamps - take.timestamps[0]
+    # A small tolerance keeps the last frame when its time is a multiple of the new period up to rounding.
+    wanted = np.arange(int(np.floor(times[-1] * fps + 1e-6)) + 1) / fps
+    after = np.clip(np.searchsorted(times, wanted - 1e-9), 1, max(1, count - 1))
+    if count == 1:
+        return replace(take, fps=fps, timestamps=None)
+    before = after - 1
+    share = np.clip((wanted - times[before]) / (times[after] - times[before]), 0.0, 1.0)[:, None]
+    share = np.where(share < 1e-6, 0.0, np.where(share > 1.0 - 1e-6, 1.0, share))
+    return replace(
+        take,
+        fps=fps,
+        frames={name: (1.0 - share) * f[before] + share * f[after] for name, f in take.frames.items()},
+        filled={
+            name: (marks[before] & (share < 1.0)) | (marks[after] & (share > 0.0))
+            for name, marks in take.filled.items()
+        },
+        timestamps=None,
+    )
+
+
+@lru_cache(maxsize=1)
+def _embedded() -> Motions:
+    return read_npz(asset("motions", "embedded.npz"))
+
+
+def _format_and_path(text: str) -> tuple[Format, Path]:
+    prefix, colon, rest = text.partition(":")
+    if colon and prefix in FORMATS:
+        if not rest:
+            raise MotionError(f"{text!r} names no path; expected {prefix}:PATH")
+        return FORMATS[prefix], Path(rest).expanduser()
+    path = Path(text).expanduser()
+    if not path.exists():
+        hint = "" if not colon else f"; {prefix!r} is no format, {nearest_name(prefix, FORMATS)}"
+        raise MotionError(f"no motions {text!r}: expected 'embedded', 'format:PATH' or the path of a recording{hint}")
+    for chosen in FORMATS.values():
+        if chosen.matches(path):
+            return chosen, path
+    raise MotionError(f"{path} is of no known format ({', '.join(FORMATS)}); name it as format:PATH")
+
+
+def _is_paper(path: Path) -> bool:
+    return (path / "Pepper2Human").is_dir()
+
+
+def _is_npz(path: Path) -> bool:
+    return path.suffix == ".npz" and path.is_file()
+
+
+FORMATS: dict[str, Format] = {
+    entry.name: entry
+    for entry in (
+        Format("paper", "the folder of the paper's workbooks", read_paper, _is_paper),
+        Format("npz", "a file written by save_motions", read_npz, _is_npz),
+    )
+}
+"""Known formats by prefix."""
