@@ -82,7 +82,7 @@ class OneEuro(Agent):
     """The One-Euro filter: a low-pass whose cutoff rises with speed.
 
     Casiez, Roussel, Vogel, *1 Euro Filter: A Simple Speed-based Low-pass Filter for Noisy Input in Interactive
-    Systems*, CHI 2012, https://gery.casiez.net/1euro/. ``cutoff = min_cutoff + beta |smoothed speed|`` and the weight of
+    Systems*, CHI 2012, https://gery.casiez.net/1euro/. ``cutoff = min_cutoff + beta |smoothed speed|``; the weight of
     the newest value is ``1 / (1 + 1 / (2 pi cutoff dt))``.
 
     Args:
