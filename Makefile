@@ -7,7 +7,7 @@ OUT ?= demo-output
 export OMP_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test lint types check clean
+.PHONY: demo test lint types check docs wheel clean
 
 demo: $(INSTALLED)
 	$(BIN)/syda-gym demo --out $(OUT)
@@ -23,13 +23,20 @@ lint: $(INSTALLED)
 types: $(INSTALLED)
 	$(BIN)/mypy
 
-check: lint types test
+check: lint types test docs
+
+docs: $(INSTALLED)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "open site/index.html"
+
+wheel: $(INSTALLED)
+	$(BIN)/python -m build --outdir dist
 
 $(INSTALLED): pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet "torch==2.13.0"
-	$(BIN)/python -m pip install --quiet -e ".[dev,train,ik]"
+	$(BIN)/python -m pip install --quiet -e ".[dev,docs,train,ik,bvh,live,export]"
 	touch $@
 
 clean:
