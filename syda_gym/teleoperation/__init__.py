@@ -1,0 +1,30 @@
+"""LIVE use: sources, the loop, sinks."""
+
+from syda_gym.teleoperation.calibration import Calibration, calibrate
+from syda_gym.teleoperation.journal import Journal, replay_journal
+from syda_gym.teleoperation.loop import TeleoperationLoop
+from syda_gym.teleoperation.runner import run
+from syda_gym.teleoperation.sinks import ManySinks, MemorySink, Sink, UdpSink
+from syda_gym.teleoperation.sources import ReplaySource, Source, UdpSource, WebSocketSource
+from syda_gym.teleoperation.tick import Decision, LoopSettings, State, Tick
+
+__all__ = [
+    "Calibration",
+    "Decision",
+    "Journal",
+    "LoopSettings",
+    "ManySinks",
+    "MemorySink",
+    "ReplaySource",
+    "Sink",
+    "Source",
+    "State",
+    "TeleoperationLoop",
+    "Tick",
+    "UdpSink",
+    "UdpSource",
+    "WebSocketSource",
+    "calibrate",
+    "replay_journal",
+    "run",
+]

@@ -1,0 +1,88 @@
+"""GuardedMapping: one live frame through a mapping or chain, together with what the mapping thinks of it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.robot import Robot
+from syda_gym.errors import SydaError, TeleoperationError
+from syda_gym.mappings.chain import ChainMapping
+from syda_gym.mappings.mapping import Mapping
+
+__all__ = ["GuardedMapping", "Mapped"]
+
+
+class Mapped(NamedTuple):
+    """One mapped frame: joint angles ``(n,)`` [rad], error bound [m] (infinite if unknown), out of distribution."""
+
+    angles: FloatArray
+    bound: float
+    unfamiliar: bool
+
+
+class GuardedMapping:
+    """Walks a mapping's links once per frame and collects bound and familiarity on the way.
+
+    Asking a chain for its image, its bound and its familiarity one after the other would walk it three times.
+
+    Args:
+        mapping: ends at a robot.
+
+    Attributes:
+        notices: what the mapping cannot tell, for the screen.
+
+    Raises:
+        TeleoperationError: the mapping does not end at a robot.
+    """
+
+    def __init__(self, mapping: Mapping) -> None:
+        if not isinstance(mapping.target, Robot):
+            raise TeleoperationError(
+                f"{mapping!r} ends at {mapping.target.name!r}, which is no robot; choose a route that ends at one"
+            )
+        self.mapping = mapping
+        self.robot: Robot = mapping.target
+        self.links = mapping.links if isinstance(mapping, ChainMapping) else (mapping,)
+        self.notices: list[str] = []
+        self._bounded = self._knows("error_bound", "no error bound: the robot is not slowed by it")
+        self._familiar = self._knows("unfamiliar", "no familiarity: unusual poses are not slowed")
+        self._gains = [_gain(link) for link in self.links]
+
+    def __call__(self, frame: FloatArray) -> Mapped:
+        """Maps one frame ``(F,)`` of the mapping's source.
+
+        Raises:
+            SydaError: whatever the mapping raises on a frame that it cannot take.
+        """
+        current, bound, unfamiliar = frame, 0.0, False
+        for link, gain in zip(self.links, self._gains, strict=True):
+            if self._bounded:
+                bound = bound * gain + float(link.error_bound(current)[0])
+            if self._familiar and not unfamiliar:
+                unfamiliar = bool(link.unfamiliar(current)[0])
+            current = link(current)
+        if not np.isfinite(current).all():
+            raise TeleoperationError(f"{self.mapping!r} gave joint angles that are not finite")
+        return Mapped(current, bound, unfamiliar)
+
+    def _knows(self, question: str, notice: str) -> bool:
+        """Whether every link answers; links that were fitted on too little, or not fitted at all, do not."""
+        for link in self.links:
+            probe = link.source.rest if isinstance(link.source, Robot) else link.source.standing()  # type: ignore[attr-defined]
+            try:
+                answer = getattr(link, question)(probe)
+            except SydaError:
+                answer = np.array([np.nan])
+            if not np.isfinite(answer).all():
+                self.notices.append(f"{' > '.join(link.route)}: {notice}")
+                return False
+        return True
+
+
+def _gain(link: Mapping) -> float:
+    """How much a link enlarges a displacement that enters it."""
+    confidence = getattr(link, "confidence", None)
+    return float(confidence.gain) if confidence is not None else 1.0

@@ -1,0 +1,230 @@
+"""Journal: every tick and decision of a run in a file, from which the same commands follow again, bit for bit."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.errors import TeleoperationError
+from syda_gym.mappings.mapping import Mapping
+from syda_gym.teleoperation.loop import TeleoperationLoop
+from syda_gym.teleoperation.tick import Decision, LoopSettings, State, Tick
+
+__all__ = ["FORMAT", "Journal", "ReplayReport", "read_journal", "replay_journal"]
+
+FORMAT = "syda-gym teleoperation journal 1"
+_MAX_LINE = 1 << 20
+
+
+class Journal:
+    """Writes one JSON line per tick: what came in, what was decided.
+
+    A Python float written by ``json`` reads back as the same float, so nothing is lost. Unlike other files of this
+    library the journal is written as it goes, for it must survive a crash; names ending in ``.gz`` are compressed.
+
+    Args:
+        path: a new file.
+        loop: the loop whose decisions are written.
+        note: free facts for the first line, for example how the mapping was made.
+
+    Raises:
+        TeleoperationError: the file exists or cannot be written.
+    """
+
+    def __init__(
+        self, path: str | os.PathLike[str], loop: TeleoperationLoop, note: dict[str, Any] | None = None
+    ) -> None:
+        self.path = Path(path)
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: IO[str] = _open(self.path, "xt")
+        except OSError as error:
+            raise TeleoperationError(
+                f"cannot write the journal {self.path}: {error.strerror}; choose a new file in a folder you may write"
+            ) from error
+        self._write(
+            {
+                "format": FORMAT,
+                "settings": loop.settings.to_json(),
+                "route": list(loop.mapping.route),
+                "mapping": loop.mapping.card.to_json(),
+                "robot": loop.robot.spec(),
+                "start": loop.command.tolist(),
+                "note": note or {},
+            }
+        )
+
+    def decided(self, tick: Tick, decision: Decision) -> None:
+        """Writes one tick and its decision."""
+        line: dict[str, Any] = {"t": tick.now, "state": decision.state.value, "q": decision.command.tolist()}
+        if tick.frame is not None:
+            line["frame"] = tick.frame.tolist()
+            line["sent"] = tick.sent
+            line["tracking"] = tick.tracking
+        if tick.controls:
+            line["controls"] = list(tick.controls)
+        if not math.isnan(decision.bound):
+            line["bound"] = decision.bound if math.isfinite(decision.bound) else None
+        if decision.factor != 1.0:
+            line["factor"] = decision.factor
+        if decision.reasons:
+            line["reasons"] = list(decision.reasons)
+        self._write(line)
+
+    def dropped(self, now: float, counts: dict[str, int]) -> None:
+        """Writes how many packets have been dropped by ``now`` before they reached the loop, by reason."""
+        self._write({"t": now, "dropped": counts})
+
+    def flush(self) -> None:
+        """Hands everything to the operating system."""
+        self._file.flush()
+
+    def close(self) -> None:
+        """Ends the file."""
+        if not self._file.closed:
+            self._file.close()
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _write(self, value: dict[str, Any]) -> None:
+        self._file.write(json.dumps(value, separators=(",", ":")) + "\n")
+
+
+@dataclass(frozen=True)
+class ReplayReport:
+    """What a replay found.
+
+    Attributes:
+        ticks: decisions compared.
+        same: how many of them were the same, bit for bit.
+        first_difference: line of the first other decision, ``None`` if all are the same.
+        commands: the replayed commands ``(ticks, n)`` [rad].
+    """
+
+    ticks: int
+    same: int
+    first_difference: int | None
+    commands: FloatArray
+
+    @property
+    def exact(self) -> bool:
+        """Whether every decision was the same."""
+        return self.ticks == self.same
+
+
+def read_journal(path: str | os.PathLike[str]) -> tuple[dict[str, Any], Iterator[tuple[int, Tick, Decision]]]:
+    """Reads a journal.
+
+    Returns:
+        The first line, and an iterator over line number, tick and decision. A last line that was cut off by a crash
+        ends the iteration.
+
+    Raises:
+        TeleoperationError: no such file, not a journal, or a broken line; the message names the line.
+    """
+    source = Path(path)
+    if not source.is_file():
+        raise TeleoperationError(f"no journal {source}; check the path")
+    file = _open(source, "rt")
+    try:
+        head = json.loads(file.readline(_MAX_LINE))
+    except (ValueError, OSError, EOFError) as error:
+        file.close()
+        raise TeleoperationError(f"{source} is not a journal: {error}") from error
+    if not isinstance(head, dict) or head.get("format") != FORMAT:
+        file.close()
+        raise TeleoperationError(f"{source} is not a journal; expected a first line with format {FORMAT!r}")
+    return head, _decisions(source, file)
+
+
+def replay_journal(path: str | os.PathLike[str], mapping: Mapping) -> ReplayReport:
+    """Feeds the ticks of a journal to a new loop and compares its decisions with those written.
+
+    Args:
+        path: the journal.
+        mapping: the mapping of that run.
+
+    Raises:
+        TeleoperationError: not a journal, or a mapping of another route or fit.
+    """
+    head, decisions = read_journal(path)
+    if list(mapping.route) != head["route"] or json.loads(json.dumps(mapping.card.to_json())) != head["mapping"]:
+        raise TeleoperationError(
+            f"the journal was written with {' > '.join(head['route'])} ({head['mapping'].get('method')}); the mapping "
+            f"given is {mapping!r} or another fit of it; give the mapping of that run"
+        )
+    loop = TeleoperationLoop(mapping, LoopSettings.from_json(head["settings"]), np.array(head["start"]))
+    ticks = same = 0
+    first: int | None = None
+    commands = []
+    for number, tick, written in decisions:
+        decided = loop.step(tick)
+        ticks += 1
+        commands.append(decided.command)
+        if decided.state == written.state and decided.command.tobytes() == written.command.tobytes():
+            same += 1
+        elif first is None:
+            first = number
+    return ReplayReport(ticks, same, first, np.array(commands).reshape(ticks, loop.robot.n_features))
+
+
+def _decisions(source: Path, file: IO[str]) -> Iterator[tuple[int, Tick, Decision]]:
+    with file:
+        number = 1
+        while True:
+            number += 1
+            try:
+                text = file.readline(_MAX_LINE)
+            except (OSError, EOFError, UnicodeDecodeError):
+                return  # a compressed journal whose writer was killed
+            if not text.endswith("\n"):
+                return
+            try:
+                line = json.loads(text)
+                if "dropped" in line:
+                    continue
+                yield number, _tick(line), _decision(line)
+            except (ValueError, KeyError, TypeError) as error:
+                raise TeleoperationError(f"{source}, line {number}: not a decision: {error!r}") from error
+
+
+def _tick(line: dict[str, Any]) -> Tick:
+    frame = line.get("frame")
+    return Tick(
+        now=float(line["t"]),
+        frame=None if frame is None else np.array(frame, dtype=np.float64),
+        sent=None if line.get("sent") is None else float(line["sent"]),
+        tracking=float(line.get("tracking", 1.0)),
+        controls=tuple(line.get("controls", ())),
+    )
+
+
+def _decision(line: dict[str, Any]) -> Decision:
+    bound = line.get("bound", float("nan"))
+    return Decision(
+        now=float(line["t"]),
+        state=State(line["state"]),
+        command=np.array(line["q"], dtype=np.float64),
+        bound=float("inf") if bound is None else float(bound),
+        factor=float(line.get("factor", 1.0)),
+        reasons=tuple(line.get("reasons", ())),
+    )
+
+
+def _open(path: Path, mode: str) -> IO[str]:
+    if path.suffix == ".gz":
+        return gzip.open(path, mode, compresslevel=1, encoding="utf-8")  # type: ignore[return-value]
+    return open(path, mode, encoding="utf-8")

@@ -1,0 +1,200 @@
+"""SelfCollision: would the robot touch itself? The URDF's collision shapes, checked by pinocchio and coal."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.robot import Robot
+from syda_gym.errors import OptionError
+
+__all__ = ["SelfCollision"]
+
+_SAMPLES = 256
+_ALWAYS = 0.5  # pairs that touch in more than this share of random poses overlap by construction
+
+
+class SelfCollision:
+    """Checks command steps against the robot's own body.
+
+    The joints that are not arm joints are locked at rest. Pairs of shapes that are neighbours in the kinematic tree,
+    that the description disables, that already touch at rest or that touch in most random poses say nothing about a
+    pose and are left out, as in the set-up assistants of motion planners.
+
+    Args:
+        robot: whose shapes.
+        margin: distance [m] below which two links count as touching.
+
+    Attributes:
+        available: false when the URDF has no collision shape that could be read; then nothing is checked, and
+            ``why`` says so.
+        why: empty, or the reason for not checking.
+        pairs: number of pairs of shapes that are checked.
+
+    Raises:
+        OptionError: ``margin`` is negative.
+    """
+
+    def __init__(self, robot: Robot, margin: float = 0.005) -> None:
+        if margin < 0.0:
+            raise OptionError(f"self-collision margin must not be negative, got {margin} m")
+        self.robot = robot
+        self.margin = margin
+        self.why = ""
+        self.pairs = 0
+        try:
+            self._model, self._shapes = _arm_model(robot)
+        except (ValueError, RuntimeError) as error:  # meshes that are missing or broken
+            self.why = f"self-collision is not checked: {str(error).splitlines()[0]}"
+        else:
+            self._index, self._turns = _indices(self._model, robot)
+            self._configuration = np.zeros(self._model.nq)
+            self._choose_pairs()
+            self.pairs = len(self._shapes.collisionPairs)
+            if not self.pairs:
+                self.why = f"self-collision is not checked: {robot.urdf.name} has no collision shapes on two links"
+
+    @property
+    def available(self) -> bool:
+        """Whether anything is checked."""
+        return not self.why
+
+    def touches(self, angles: FloatArray) -> bool:
+        """Whether any pair of links is nearer than the margin at ``angles`` ``(n,)`` [rad]."""
+        import pinocchio
+
+        if not self.available:
+            return False
+        return bool(
+            pinocchio.computeCollisions(
+                self._model, self._data, self._shapes, self._shape_data, self._full(angles), True
+            )
+        )
+
+    def touching_links(self, angles: FloatArray) -> tuple[tuple[str, str], ...]:
+        """Names of the links that touch at ``angles`` ``(n,)`` [rad], for messages."""
+        if not self.available:
+            return ()
+        names = [self._model.frames[shape.parentFrame].name for shape in self._shapes.geometryObjects]
+        found = {
+            (names[pair.first], names[pair.second])
+            for pair, hit in zip(self._shapes.collisionPairs, self._hits(angles), strict=True)
+            if hit
+        }
+        return tuple(sorted(found))
+
+    def free_path(self, start: FloatArray, end: FloatArray, step: float = 0.1) -> bool:
+        """Whether the straight way from ``start`` (known to be free) to ``end`` is free, tested every ``step`` rad."""
+        if not self.available:
+            return True
+        count = max(1, math.ceil(float(np.max(np.abs(end - start))) / step))
+        return not any(self.touches(start + (end - start) * (i / count)) for i in range(count, 0, -1))
+
+    def allowed(self, start: FloatArray, end: FloatArray) -> FloatArray:
+        """The part of a step that stays free: all of it, one arm of it, or none.
+
+        Args:
+            start: the last command ``(n,)`` [rad], free.
+            end: the next command ``(n,)`` [rad].
+
+        Returns:
+            ``end``, ``end`` with the arm that would collide left at ``start``, or ``start``.
+        """
+        if self.free_path(start, end):
+            return end
+        if len(self.robot.arm_slices) > 1:
+            for part in self.robot.arm_slices:
+                one = start.copy()
+                one[part] = end[part]
+                if self.free_path(start, one):
+                    return one
+        return start
+
+    def _full(self, angles: FloatArray) -> FloatArray:
+        self._configuration[self._index] = angles
+        for joint, at in self._turns:  # a continuous joint is a cosine and a sine in pinocchio
+            self._configuration[at] = math.cos(angles[joint])
+            self._configuration[at + 1] = math.sin(angles[joint])
+        return self._configuration
+
+    def _hits(self, angles: FloatArray) -> list[bool]:
+        import pinocchio
+
+        pinocchio.computeCollisions(self._model, self._data, self._shapes, self._shape_data, self._full(angles), False)
+        return [result.isCollision() for result in self._shape_data.collisionResults]
+
+    def _choose_pairs(self) -> None:
+        shapes = self._shapes
+        shapes.addAllCollisionPairs()
+        disabled = {frozenset(pair) for pair in self.robot.description.disabled_collisions}
+        names = [self._model.frames[shape.parentFrame].name for shape in shapes.geometryObjects]
+        joints = [shape.parentJoint for shape in shapes.geometryObjects]
+        parents = self._model.parents
+        self._keep(
+            [
+                frozenset((names[pair.first], names[pair.second])) not in disabled
+                and parents[joints[pair.first]] != joints[pair.second]
+                and parents[joints[pair.second]] != joints[pair.first]
+                for pair in shapes.collisionPairs
+            ]
+        )
+        rng = np.random.default_rng(0)
+        poses = self.robot.clamp(rng.uniform(self.robot.lower, self.robot.upper, (_SAMPLES, len(self.robot.lower))))
+        often = np.mean([self._hits(pose) for pose in poses], axis=0) > _ALWAYS
+        # Pairs within the margin at rest would never let the robot start.
+        self._keep(list(~(often | np.array(self._hits(self.robot.rest), dtype=bool))))
+
+    def _keep(self, chosen: list[bool]) -> None:
+        """Keeps only the chosen pairs of shapes and renews the buffers that depend on them."""
+        import pinocchio
+
+        # Indices first: the list's elements are references into a vector that changes under removal.
+        pairs = [(pair.first, pair.second) for pair in self._shapes.collisionPairs]
+        self._shapes.removeAllCollisionPairs()
+        for (first, second), keep in zip(pairs, chosen, strict=True):
+            if keep:
+                self._shapes.addCollisionPair(pinocchio.CollisionPair(first, second))
+        self._data = pinocchio.Data(self._model)
+        self._shape_data = pinocchio.GeometryData(self._shapes)
+        for request in self._shape_data.collisionRequests:
+            request.security_margin = self.margin
+
+
+def _arm_model(robot: Robot) -> tuple[Any, Any]:
+    """Pinocchio's model and collision shapes with every joint but the arms' locked at rest."""
+    import pinocchio
+
+    model = pinocchio.buildModelFromUrdf(str(robot.urdf))
+    folders = [str(folder) for folder in robot.urdf.parents[:5]]
+    shapes = pinocchio.buildGeomFromUrdf(model, str(robot.urdf), pinocchio.GeometryType.COLLISION, package_dirs=folders)
+    configuration = pinocchio.neutral(model)
+    for name, angle in robot.description.rest.items():
+        if model.existJointName(name) and model.joints[model.getJointId(name)].nq == 1:
+            configuration[model.joints[model.getJointId(name)].idx_q] = angle
+    locked = [model.getJointId(name) for name in model.names if name not in ("universe", *robot.joint_names)]
+    for shape in shapes.geometryObjects:
+        _convex(shape)
+    reduced, kept = pinocchio.buildReducedModel(model, shapes, locked, configuration)
+    return reduced, kept
+
+
+def _convex(shape: Any) -> None:
+    """Replaces a mesh by its convex hull, which is faster to check and never smaller."""
+    if hasattr(shape.geometry, "buildConvexHull"):
+        shape.geometry.buildConvexHull(True, "Qt")
+        if shape.geometry.convex is not None:
+            shape.geometry = shape.geometry.convex
+
+
+def _indices(model: Any, robot: Robot) -> tuple[list[int], list[tuple[int, int]]]:
+    """Where each arm joint's angle goes in pinocchio's configuration, and which joints are continuous."""
+    index, turns = [], []
+    for column, name in enumerate(robot.joint_names):
+        joint = model.joints[model.getJointId(name)]
+        index.append(joint.idx_q)
+        if joint.nq == 2:
+            turns.append((column, joint.idx_q))
+    return index, turns
