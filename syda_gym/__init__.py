@@ -1,0 +1,94 @@
+"""Map a human's motion onto a humanoid, chain such maps, know which chain will work, and prove how good it is.
+
+Importing the package registers ``SydaTeleop-v0`` with Gymnasium. Everything else, PyTorch and PyBullet included, is
+loaded when it is first used.
+
+    import gymnasium as gym
+    import syda_gym
+
+    env = gym.make("SydaTeleop-v0")
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+
+from syda_gym.errors import SydaError
+
+if TYPE_CHECKING:
+    from syda_gym import transferability as transferability
+    from syda_gym.embodiments.catalog import get as embodiment
+    from syda_gym.embodiments.embodiment import landmark_error
+    from syda_gym.mappings.chain import ChainMapping
+    from syda_gym.mappings.fitting import fit
+    from syda_gym.mappings.mapping import Mapping
+    from syda_gym.mappings.storage import load_mapping, save_mapping
+    from syda_gym.motions.clip import Motions, PairedMotions
+    from syda_gym.motions.loading import load_motions
+    from syda_gym.motions.readers.npz import save_motions
+    from syda_gym.transferability.routing import best_route
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "ChainMapping",
+    "Mapping",
+    "Motions",
+    "PairedMotions",
+    "SydaError",
+    "__version__",
+    "best_route",
+    "embodiment",
+    "fit",
+    "landmark_error",
+    "load_mapping",
+    "load_motions",
+    "save_mapping",
+    "save_motions",
+    "transferability",
+]
+
+# Public name -> the module that holds it and its name there (None: the module itself).
+_LAZY: dict[str, tuple[str, str | None]] = {
+    "ChainMapping": ("mappings.chain", "ChainMapping"),
+    "Mapping": ("mappings.mapping", "Mapping"),
+    "Motions": ("motions.clip", "Motions"),
+    "PairedMotions": ("motions.clip", "PairedMotions"),
+    "best_route": ("transferability.routing", "best_route"),
+    "embodiment": ("embodiments.catalog", "get"),
+    "fit": ("mappings.fitting", "fit"),
+    "landmark_error": ("embodiments.embodiment", "landmark_error"),
+    "load_mapping": ("mappings.storage", "load_mapping"),
+    "load_motions": ("motions.loading", "load_motions"),
+    "save_mapping": ("mappings.storage", "save_mapping"),
+    "save_motions": ("motions.readers.npz", "save_motions"),
+    "transferability": (
+        "transferability",
+        None,
+    ),  # a module that can be called: syda_gym.transferability("adult", "pepper")
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Loads a public name on first use (PEP 562)."""
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; public are {', '.join(__all__)}")
+    module, attribute = _LAZY[name]
+    loaded = import_module(f"{__name__}.{module}")
+    return loaded if attribute is None else getattr(loaded, attribute)
+
+
+def __dir__() -> list[str]:
+    """Every public name, also those that are not loaded yet."""
+    return sorted({*globals(), *__all__})
+
+
+if "SydaTeleop-v0" not in gymnasium.registry:  # the package may be reloaded
+    gymnasium.register(
+        id="SydaTeleop-v0",
+        entry_point="syda_gym.envs.teleop:SydaTeleopEnv",
+        vector_entry_point="syda_gym.envs.vector:SydaTeleopVectorEnv",
+    )
