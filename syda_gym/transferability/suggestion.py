@@ -146,7 +146,7 @@ def spanning_pairs(
     exact = math.comb(len(free), missing) <= exhaustive
     if exact:
         spanning = (c for c in combinations(free, missing) if _connects(mask, c))
-        best = max(spanning, key=total)
+        best = list(max(spanning, key=total))
     else:
         best = _exchange(mask, free, _greedy_tree(mask, links, free), total)
     return SpanningPairs(tuple((names[i], names[j]) for i, j in best), total(best), exact)

@@ -86,7 +86,7 @@ def test_bad_routes() -> None:
         best_route("adult", "peper", PAIRS, **FAST)
     with pytest.raises(RouteError, match="both 'adult'"):
         best_route("adult", "adult", PAIRS, **FAST)
-    with pytest.raises(RouteError, match="lead to kid.*suggest"):
+    with pytest.raises(RouteError, match=r"lead to kid.*suggest"):
         best_route("adult", "nao", [("adult", "kid"), ("pepper", "nao")], **FAST)
     with pytest.raises(RouteError, match="twice"):
         best_route("adult", "kid", [("adult", "adult")])
