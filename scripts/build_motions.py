@@ -1,7 +1,6 @@
 """Builds ``syda_gym/assets/motions/embedded.npz``, the synthetic motions that ship with the package, from their seed.
 
-python scripts/build_motions.py            write the asset
-python scripts/build_motions.py --check    say whether the asset is what this code generates
+``python scripts/build_motions.py`` writes the asset; with ``--check`` it says whether the asset is what the code makes.
 """
 
 from __future__ import annotations

@@ -18,16 +18,16 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "dependencies.md"
 HEAD = """# Dependencies and licences
 
-syda_gym itself is under the MIT licence. It ships two robot models (Pepper and NAO) that were written for it from published
-kinematic and inertial numbers with primitive shapes, its own synthetic motions, and small weight files fitted on them; no
-meshes and no recordings of other people. The recordings of the paper are published without a licence, so they are not part of this
-project: it reads them from a folder that you name.
+syda_gym itself is under the MIT licence. It ships two robot models (Pepper and NAO) that were written for it from
+published kinematic and inertial numbers with primitive shapes, its own synthetic motions, and small weight files fitted
+on them; no meshes and no recordings of other people. The recordings of the paper are published without a licence, so
+they are not part of this project: it reads them from a folder that you name.
 
-What `pip` installs with it, directly or through another package, as their own metadata states it. The column *for* names the
-extra that needs the package (`base` is always installed). This page is written by `python scripts/list_licences.py`.
+What `pip` installs with it, directly or through another package, as their own metadata states it. The column *for* says
+which extra needs the package (`base` is always installed). `python scripts/list_licences.py` writes this page.
 
-Known vulnerabilities of what is installed can be listed with `pip install pip-audit && pip-audit`; `SECURITY.md` in the repository
-says what we guard against ourselves.
+Known vulnerabilities of what is installed can be listed with `pip install pip-audit && pip-audit`; `SECURITY.md` in the
+repository says what we guard against ourselves.
 
 | package | licence | for |
 |---|---|---|
@@ -104,10 +104,10 @@ def licence(name: str) -> str:
     if name in STATED_ELSEWHERE:
         return STATED_ELSEWHERE[name]
     data = metadata.metadata(name)
-    if expression := data.get("License-Expression"):
+    if expression := data["License-Expression"]:
         return str(expression)
     classified = [c.split("::")[-1].strip() for c in data.get_all("Classifier") or [] if c.startswith("License ::")]
-    stated = (data.get("License") or "").strip()
+    stated = (data["License"] or "").strip()
     if stated and "\n" not in stated and len(stated) < 40 and stated != "UNKNOWN":
         return SHORT.get(stated, stated)
     if classified:
