@@ -1,8 +1,9 @@
 """The vocabulary of the synthetic motions: upper-body actions as key poses of wrist and elbow.
 
-A key pose says where a wrist is, seen from its own shoulder and in units of the arm's length: ``(forward, outward, up)``,
-outward being left for the left arm. A fourth number turns the elbow about the line from shoulder to wrist [degrees],
-outward and up for positive values. All poses stay away from a straight elbow, where its direction has no meaning.
+A key pose says where a wrist is, seen from its own shoulder and in units of the arm's length: ``(forward, outward,
+up)``, outward being left for the left arm. A fourth number turns the elbow about the line from shoulder to wrist
+[degrees], outward and up for positive values. All poses stay away from a straight elbow, where its
+direction has no meaning.
 """
 
 from __future__ import annotations
@@ -112,7 +113,12 @@ ACTIONS: tuple[Action, ...] = (
     _one("reach_up_side", "reach", (0.20, 0.62, 0.62), (0.20, 0.62, 0.62), REST),
     _one("reach_low_side", "reach", (0.15, 0.70, -0.58), (0.15, 0.70, -0.58), REST),
     _both("reach_both_front", "reach", (0.90, 0.05, -0.05), (0.90, 0.05, -0.05), REST),
-    _duo("reach_split", "reach", ((0.70, 0.1, 0.5), (0.2, 0.6, -0.6)), ((0.70, 0.1, 0.5), (0.2, 0.6, -0.6)), (REST, REST)),
+    _duo(
+        "reach_split", "reach",
+        ((0.70, 0.1, 0.5), (0.2, 0.6, -0.6)),
+        ((0.70, 0.1, 0.5), (0.2, 0.6, -0.6)),
+        (REST, REST),
+    ),
     # Waves.
     _one("wave_high", "wave", (0.35, 0.20, 0.62, 10), (0.30, 0.62, 0.52, 10)),
     _one("wave_side", "wave", (0.25, 0.55, 0.25, 20), (0.22, 0.80, 0.30, 20)),
@@ -128,14 +134,27 @@ ACTIONS: tuple[Action, ...] = (
     # Bows of the arms.
     _both("bow_down", "bow", (0.75, 0.25, 0.10), (0.45, 0.05, -0.65), (0.45, 0.05, -0.65), REST),
     _both("bow_open", "bow", (0.45, 0.72, 0.20), (0.35, 0.72, -0.45), REST),
-    _duo("bow_courtly", "bow", ((0.48, -0.30, -0.30), (0.1, 0.72, -0.35)), ((0.48, -0.32, -0.35), (0.1, 0.72, -0.45)), (REST, REST)),
+    _duo(
+        "bow_courtly", "bow",
+        ((0.48, -0.30, -0.30), (0.1, 0.72, -0.35)),
+        ((0.48, -0.32, -0.35), (0.1, 0.72, -0.45)),
+        (REST, REST),
+    ),
     # Clapping near: the hands approach without touching.
     _both("clap_chest", "clap", (0.68, -0.12, -0.12), (0.62, 0.35, -0.12)),
     _both("clap_high", "clap", (0.55, -0.08, 0.60), (0.45, 0.42, 0.60)),
     _both("clap_low", "clap", (0.58, -0.10, -0.58), (0.48, 0.42, -0.55)),
     # Crossing the arms, one hand above the other.
-    _duo("cross_chest", "cross", ((0.58, -0.38, 0.05), (0.58, -0.36, -0.22)), ((0.52, 0.30, -0.15), (0.52, 0.30, -0.30))),
-    _duo("cross_low", "cross", ((0.55, -0.38, -0.42), (0.55, -0.34, -0.62)), ((0.32, 0.55, -0.60), (0.32, 0.55, -0.60))),
+    _duo(
+        "cross_chest", "cross",
+        ((0.58, -0.38, 0.05), (0.58, -0.36, -0.22)),
+        ((0.52, 0.30, -0.15), (0.52, 0.30, -0.30)),
+    ),
+    _duo(
+        "cross_low", "cross",
+        ((0.55, -0.38, -0.42), (0.55, -0.34, -0.62)),
+        ((0.32, 0.55, -0.60), (0.32, 0.55, -0.60)),
+    ),
     _duo(
         "cross_in_turn", "cross",
         ((0.58, -0.38, 0.0), (0.35, 0.65, -0.15)), ((0.55, 0.15, -0.2), (0.55, 0.15, -0.2)),
@@ -162,15 +181,34 @@ ACTIONS: tuple[Action, ...] = (
     _both("swing_open", "swing", (0.85, 0.0, 0.05), (0.30, 0.86, 0.0)),
     # Signals, different with each arm.
     _duo("salute", "signal", ((0.45, 0.02, 0.45, 45), REST), ((0.45, 0.02, 0.45, 45), REST), (REST, REST)),
-    _duo("stop_traffic", "signal", ((0.35, 0.10, 0.86), (0.25, 0.86, 0.0)), ((0.90, 0.05, 0.1), (0.25, 0.86, 0.0)), (REST, REST)),
-    _duo("archer", "signal", ((0.80, 0.42, 0.08), (0.68, -0.22, 0.05, 35)), ((0.80, 0.42, 0.08), (0.38, 0.38, 0.05, 35)), (REST, REST)),
+    _duo(
+        "stop_traffic", "signal",
+        ((0.35, 0.10, 0.86), (0.25, 0.86, 0.0)),
+        ((0.90, 0.05, 0.1), (0.25, 0.86, 0.0)),
+        (REST, REST),
+    ),
+    _duo(
+        "archer", "signal",
+        ((0.80, 0.42, 0.08), (0.68, -0.22, 0.05, 35)),
+        ((0.80, 0.42, 0.08), (0.38, 0.38, 0.05, 35)),
+        (REST, REST),
+    ),
     _both("shrug", "signal", (0.42, 0.55, -0.25), (0.42, 0.55, -0.25), (0.35, 0.25, -0.62)),
     # Work.
     _one("throw", "work", (0.15, 0.50, 0.55, 20), (0.80, 0.05, 0.30), (0.62, -0.20, -0.50)),
-    _duo("pour", "work", ((0.60, 0.05, 0.15, 35), (0.65, 0.0, -0.35)), ((0.58, -0.15, 0.15, 50), (0.65, 0.0, -0.35)), ((0.62, 0.15, -0.3), (0.62, 0.1, -0.4))),
+    _duo(
+        "pour", "work",
+        ((0.60, 0.05, 0.15, 35), (0.65, 0.0, -0.35)),
+        ((0.58, -0.15, 0.15, 50), (0.65, 0.0, -0.35)),
+        ((0.62, 0.15, -0.3), (0.62, 0.1, -0.4)),
+    ),
     _turns("drum", "work", (0.62, 0.08, 0.02), (0.66, 0.05, -0.42)),
     _turns("climb", "work", (0.50, 0.10, 0.74), (0.62, 0.15, -0.10)),
-    _duo("sweep_floor", "work", ((0.62, 0.30, -0.48), (0.58, -0.25, -0.25)), ((0.60, -0.25, -0.50), (0.60, 0.25, -0.25))),
+    _duo(
+        "sweep_floor", "work",
+        ((0.62, 0.30, -0.48), (0.58, -0.25, -0.25)),
+        ((0.60, -0.25, -0.50), (0.60, 0.25, -0.25)),
+    ),
     _one("knock", "work", (0.72, 0.08, 0.12), (0.62, 0.10, 0.12), (0.72, 0.08, 0.12), (0.60, 0.10, -0.10)),
 )  # fmt: skip
 """Every action of the synthetic motions."""

@@ -1,4 +1,4 @@
-"""``load_motions``: one door for every source of motions, named by ``format:PATH`` or found by looking into the file."""
+"""``load_motions``: one door for every source of motions, named ``format:PATH`` or found by looking into the file."""
 
 from __future__ import annotations
 

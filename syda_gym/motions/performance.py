@@ -1,4 +1,4 @@
-"""How one body performs an action: its proportions, style and lag, the camera that watches a human, a robot's limits."""
+"""How one body performs an action: proportions, style and lag, the camera that watches a human, a robot's limits."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The embedded default motions: generated from a seed, nobody's recording.
 
 Every take is one action performed together by several bodies, frame by frame, each with its own proportions, posture
-bias, timing lag and style; humans are watched by a simulated depth camera with noise and dropouts, robots stay within their
-joint limits and speeds. The motions stand in for recordings so that everything works without any; results on them
+bias, timing lag and style; humans are watched by a simulated depth camera with noise and dropouts, robots stay within
+their joint limits and speeds. The motions stand in for recordings so that everything works without any; results on them
 say how methods compare, not how well a real person would be followed.
 """
 

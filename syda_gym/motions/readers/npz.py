@@ -1,7 +1,7 @@
 """The library's own motion file: one ``.npz`` of plain arrays and a JSON description, nothing pickled.
 
-``meta`` is UTF-8 JSON as bytes; ``frames_<i>`` holds all frames of body ``i`` after one another, ``filled_<i>`` its gaps as
-packed bits, ``timestamps`` the recorded times of the takes that have them. Rounded files keep frames as 16-bit
+``meta`` is UTF-8 JSON as bytes; ``frames_<i>`` holds all frames of body ``i`` after one another, ``filled_<i>`` its
+gaps as packed bits, ``timestamps`` the recorded times of the takes that have them. Rounded files keep frames as 16-bit
 differences over time and the step in the description; they are small and read to the same bits everywhere.
 """
 
@@ -104,7 +104,7 @@ def read_npz(path: str | os.PathLike[str]) -> Motions:
             raise MotionError(
                 f"{file}: format {meta['format']!r}, expected {FORMAT!r}; write it again with this version"
             )
-        bodies = {str(entry["name"]): _body(entry["spec"]) for entry in meta["bodies"]}
+        bodies = {str(entry["name"]): _body(file, entry["spec"]) for entry in meta["bodies"]}
         frames = [
             _decode(file, arrays.get(f"frames_{index}"), body, entry["step"])
             for index, (body, entry) in enumerate(zip(bodies.values(), meta["bodies"], strict=True))
@@ -115,7 +115,7 @@ def read_npz(path: str | os.PathLike[str]) -> Motions:
         return Motions(str(meta["name"]), takes, bodies, families, bool(meta["synthetic"]))
     except (MotionError, EmbodimentError):
         raise
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError, RecursionError) as error:
         raise MotionError(
             f"{file} is no motion file of this library or is damaged ({type(error).__name__}: {error}); "
             "expected one written by save_motions"
@@ -183,7 +183,7 @@ def _unfold(stored: NDArray[Any], step: float) -> FloatArray:
     """Inverse of the rounding branch of ``_encode``."""
     folded = stored[0].astype(np.int32) | stored[1].astype(np.int32) << 8
     change = (folded >> 1 ^ -(folded & 1)).astype(np.int16)
-    result: FloatArray = np.cumsum(change, axis=1, dtype=np.int16).T * step
+    result: FloatArray = np.cumsum(change, axis=1, dtype=np.int16).T.astype(np.float64) * step
     return result
 
 
@@ -193,7 +193,7 @@ def _decode(file: Path, stored: NDArray[Any] | None, body: Embodiment, step: flo
     if step is not None:
         if stored.dtype != np.uint8 or stored.ndim != 3 or len(stored) != 2 or not 0.0 < float(step) < 1.0:
             raise MotionError(f"{file}: rounded frames of {body.name!r} are damaged")
-        stored = _unfold(stored, float(step))
+        stored = np.asarray(_unfold(stored, float(step)))
     if stored.dtype != np.float64 or stored.ndim != 2 or stored.shape[1] != body.n_features:
         raise MotionError(
             f"{file}: frames of {body.name!r} have shape {stored.shape} and type {stored.dtype}, "
@@ -204,7 +204,7 @@ def _decode(file: Path, stored: NDArray[Any] | None, body: Embodiment, step: flo
         raise MotionError(
             f"{file}: frame {bad[0][0]} of {body.name!r}, {body.features[bad[0][1]].name} is not a finite number"
         )
-    return np.ascontiguousarray(stored)
+    return np.ascontiguousarray(stored, dtype=np.float64)
 
 
 def _unpack(file: Path, stored: NDArray[Any] | None, frames: FloatArray) -> NDArray[np.bool_] | None:
@@ -221,13 +221,14 @@ def _body_spec(body: Embodiment) -> dict[str, Any]:
     return spec if body.kind == "human" else {"kind": "robot", "name": body.name, "joints": spec["joints"]}
 
 
-def _body(spec: dict[str, Any]) -> Embodiment:
-    if spec.get("kind") == "human":
-        return catalog.from_spec(spec)
-    body = catalog.get(str(spec["name"]))
+def _body(file: Path, spec: dict[str, Any]) -> Embodiment:
+    try:
+        body = catalog.from_spec(spec) if spec.get("kind") == "human" else catalog.get(str(spec["name"]))
+    except EmbodimentError as error:
+        raise EmbodimentError(f"{file}: {error}") from error
     joints = [feature.name for feature in body.features]
-    if joints != spec["joints"]:
-        raise EmbodimentError(f"robot {body.name!r} has joints {joints}, the motions {spec['joints']}; record again")
+    if body.kind == "robot" and joints != spec["joints"]:
+        raise EmbodimentError(f"{file}: robot {body.name!r} has joints {joints}, the motions {spec['joints']}")
     return body
 
 

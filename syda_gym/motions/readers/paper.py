@@ -141,7 +141,8 @@ def _angle(quaternions: FloatArray, axis: int, tilt: float) -> FloatArray:
     c, s = np.cos(tilt / 2), np.sin(tilt / 2)
     turned = np.stack([c * x + s * z, c * y + s * w, c * z - s * x, c * w - s * y])
     angle = 2.0 * np.arctan2(turned[axis], turned[3])
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+    wrapped: FloatArray = (angle + np.pi) % (2.0 * np.pi) - np.pi
+    return wrapped
 
 
 def _sheets(path: Path, names: list[str] | tuple[str, ...]) -> dict[str, FloatArray]:
