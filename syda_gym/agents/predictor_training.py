@@ -1,0 +1,334 @@
+"""Training of the predictor: regression through the servo, on recorded streams, in torch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syda_gym.agents.agent import Agent
+from syda_gym.agents.classical import Lead
+from syda_gym.agents.figures import JOINT_WEIGHT, Figures
+from syda_gym.agents.interface import Interface, lag_share
+from syda_gym.agents.predictor import Predictor, network_inputs
+from syda_gym.agents.streams import Streams, play_streams, read_stream, score_streams
+from syda_gym.agents.tcn import DILATIONS, TcnShape
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.errors import AgentError
+from syda_gym.simulation.rates import Rates
+
+if TYPE_CHECKING:
+    import torch
+
+__all__ = ["PredictorConfig", "TrainedPredictor", "train_predictor"]
+
+
+@dataclass(frozen=True)
+class PredictorConfig:
+    """Hyper-parameters of the predictor.
+
+    Attributes:
+        channels: width of the network.
+        iterations: optimiser steps.
+        batch: episodes per step.
+        learning_rate: at the start; it falls along a cosine.
+        weight_decay: of AdamW.
+        jitter_weight: of the jitter against the landmark error; 1 trains on the objective ``J`` itself.
+        strength: of the lead on top.
+        bound: largest correction [rad].
+        rounds: how often the network is played in the servo model to renew the joint angles it reads, and judged on the
+            validation streams.
+        mirror: whether to train on left-right mirror images as well.
+    """
+
+    channels: int = 48
+    iterations: int = 480
+    batch: int = 32
+    learning_rate: float = 3e-3
+    weight_decay: float = 1e-3
+    jitter_weight: float = 1.0
+    strength: float = 1.0
+    bound: float = 0.6
+    rounds: int = 6
+    mirror: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("channels", "iterations", "batch", "rounds"):
+            if getattr(self, name) < 1:
+                raise AgentError(f"predictor: {name} must be at least 1, got {getattr(self, name)}")
+        if self.rounds > self.iterations:
+            raise AgentError(f"predictor: {self.rounds} rounds need at least as many iterations, got {self.iterations}")
+
+
+@dataclass(frozen=True, eq=False)
+class TrainedPredictor:
+    """What training gives.
+
+    Attributes:
+        agent: the predictor with the lead on top, as it was best on the validation streams.
+        history: figures on the validation streams after each round, the untrained network first.
+        best: index into ``history``.
+    """
+
+    agent: Agent
+    history: tuple[Figures, ...]
+    best: int
+
+
+def train_predictor(
+    base: Agent,
+    train: Streams,
+    validation: Streams,
+    rates: Rates,
+    config: PredictorConfig | None = None,
+    *,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> TrainedPredictor:
+    """Trains a predictor on top of an agent.
+
+    The correction is played through the linear part of the servo, ``q += k (c - q)`` with the episode's own motor gain,
+    and the loss is the objective ``J`` (landmark error, joint error and jitter by the robot's kinematics). The
+    acceleration limit is left out: gradients through it diverge. The untrained network corrects nothing.
+
+    Args:
+        base: the agent below; must not look at joint angles (``BaseAlone``, ``Kalman``, filters; no lead).
+        train: streams to learn from.
+        validation: streams by which the best round is chosen.
+        rates: control and physics rate.
+        config: hyper-parameters.
+        seed: of initialisation and batches; same seed, same weights.
+        progress: called with the share that is done.
+
+    Raises:
+        AgentError: bad settings.
+    """
+    import torch
+
+    settings = config or PredictorConfig()
+    torch.set_num_threads(1)
+    trainer = _Trainer(base, train, rates, settings, seed)
+    history, snapshots = [], []
+    per_round = np.diff(np.linspace(0, settings.iterations, settings.rounds + 1).round().astype(int))
+    for index in range(settings.rounds + 1):
+        snapshots.append(trainer.weights())
+        agent = trainer.agent(snapshots[-1])
+        history.append(score_streams(agent, validation, rates))
+        if index < settings.rounds:
+            trainer.renew(play_streams(agent, trainer.streams, rates))
+            trainer.run(int(per_round[index]))
+        if progress is not None:
+            progress(index / settings.rounds)
+    best = int(np.argmin([f.landmark_mm + JOINT_WEIGHT * f.joint_mrad + settings.jitter_weight * f.jitter
+                          for f in history]))  # fmt: skip
+    return TrainedPredictor(trainer.agent(snapshots[best]), tuple(history), best)
+
+
+class _Trainer:
+    """Network, optimiser and data of one training."""
+
+    def __init__(self, base: Agent, train: Streams, rates: Rates, config: PredictorConfig, seed: int) -> None:
+        import torch
+
+        self.base, self.rates, self.config = base, rates, config
+        self.interface = base.interface
+        self.streams = _with_mirror(self.interface, train) if config.mirror else train
+        self._rng = np.random.default_rng(seed)
+        n = self.interface.n
+        self.shape = TcnShape(3 * n + 1, config.channels, n)
+        self._parameters = _initial(self.shape, seed)
+        self._optimiser = torch.optim.AdamW(
+            self._parameters.values(), lr=config.learning_rate, weight_decay=config.weight_decay
+        )
+        self._schedule = torch.optim.lr_scheduler.CosineAnnealingLR(self._optimiser, config.iterations)
+        self._below = commands_below(base, self.streams)
+        self._kinematics = TorchLandmarks(self.interface)
+        self._reference = torch.as_tensor(self.streams.reference, dtype=torch.float32)
+        with torch.no_grad():
+            self._targets = torch.stack([self._kinematics(reference) for reference in self._reference])
+        self._mask = torch.as_tensor(self.streams.mask)
+        self._share = torch.as_tensor(_motor_shares(self.streams, rates, config), dtype=torch.float32)
+        self._inputs = torch.zeros(0)
+        self._commands = torch.as_tensor(self._below, dtype=torch.float32)
+
+    def weights(self) -> dict[str, NDArray[np.float32]]:
+        """The weights as they are now."""
+        return {name: value.detach().numpy().copy() for name, value in self._parameters.items()}
+
+    def agent(self, weights: dict[str, NDArray[np.float32]]) -> Agent:
+        """The stack with given weights."""
+        c = self.config
+        predictor = Predictor(self.interface, self.base, weights=weights, channels=c.channels, bound=c.bound)
+        return Lead(self.interface, predictor, strength=c.strength)
+
+    def renew(self, q_after: FloatArray) -> None:
+        """Takes the joint angles that the current network led to as what the network sees next."""
+        import torch
+
+        before = np.concatenate([self.streams.reference[:, :1], q_after[:, :-1]], axis=1)
+        last = np.concatenate([self._below[:, :1], self._below[:, :-1]], axis=1)
+        inputs = network_inputs(self.interface, self._below, last, before, self.streams.age)
+        self._inputs = torch.as_tensor(inputs, dtype=torch.float32)
+
+    def run(self, iterations: int) -> None:
+        """Optimises for some iterations."""
+        import torch
+
+        for _ in range(iterations):
+            rows = torch.as_tensor(
+                self._rng.choice(len(self.streams), min(self.config.batch, len(self.streams)), False)
+            )
+            loss = self._loss(rows)
+            self._optimiser.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call]
+            torch.nn.utils.clip_grad_norm_(self._parameters.values(), 1.0)
+            self._optimiser.step()
+            self._schedule.step()
+
+    def _loss(self, rows: torch.Tensor) -> torch.Tensor:
+        import torch
+
+        bound = self.config.bound
+        correction = tcn(self._parameters, self._inputs[rows])
+        commands = self._commands[rows] + bound * torch.tanh(correction / bound)
+        q = _servo(commands, self._reference[rows, 0], self._share[rows])
+        mask = self._mask[rows]
+        points, targets = self._kinematics(q), self._targets[rows]
+        landmark = 1e3 * _masked(_length(points - targets).mean(-1), mask)
+        joint = 1e3 * _masked((q - self._reference[rows]).abs().mean(-1), mask)
+        third = torch.diff(points, n=3, dim=1)
+        jitter = 1e3 * _masked(_length(third).mean(-1), mask[:, 3:])
+        return landmark + JOINT_WEIGHT * joint + self.config.jitter_weight * jitter
+
+
+class TorchLandmarks:
+    """Elbows and wrists of a robot in torch, differentiable.
+
+    Args:
+        interface: whose robot.
+    """
+
+    def __init__(self, interface: Interface) -> None:
+        import torch
+
+        self._arms = [
+            (
+                part,
+                [torch.as_tensor(r, dtype=torch.float32) for r in chain.rotations],
+                [torch.as_tensor(o, dtype=torch.float32) for o in chain.offsets],
+                [torch.as_tensor(_cross(a), dtype=torch.float32) for a in chain.axes],
+                [(chain.point_joints[p], torch.as_tensor(chain.point_offsets[p], dtype=torch.float32)) for p in (1, 2)],
+            )
+            for chain, part in zip(interface.robot.chains, interface.robot.arm_slices, strict=True)
+        ]
+
+    def __call__(self, q: torch.Tensor) -> torch.Tensor:
+        """Joint angles ``(..., n)`` [rad] to landmarks ``(..., 2 * arms, 3)`` [m]."""
+        import torch
+
+        found = []
+        for part, rotations, offsets, crosses, points in self._arms:
+            angles = q[..., part]
+            rotation = torch.eye(3).expand(*angles.shape[:-1], 3, 3)
+            position = torch.zeros(*angles.shape[:-1], 3)
+            placed = {}
+            for i, (fixed, offset, cross) in enumerate(zip(rotations, offsets, crosses, strict=True)):
+                position = position + rotation @ offset
+                turn = (
+                    torch.eye(3)
+                    + torch.sin(angles[..., i, None, None]) * cross
+                    + (1.0 - torch.cos(angles[..., i, None, None])) * (cross @ cross)
+                )
+                rotation = rotation @ fixed @ turn
+                for index, (carrier, at) in enumerate(points):
+                    if carrier == i:
+                        placed[index] = position + rotation @ at
+            found += [placed[index] for index in sorted(placed)]
+        return torch.stack(found, dim=-2)
+
+
+def tcn(parameters: dict[str, Any], inputs: torch.Tensor) -> torch.Tensor:
+    """The network of ``tcn.StreamingTcn`` over whole sequences ``(E, T, inputs)``; returns ``(E, T, outputs)``."""
+    import torch
+
+    steps = inputs.shape[1]
+    hidden = torch.relu(inputs @ parameters["inlet.weight"].T + parameters["inlet.bias"])
+    for block, dilation in enumerate(DILATIONS):
+        taps = parameters[f"blocks.{block}.weight"]
+        past = torch.cat([hidden[:, :1].expand(-1, 2 * dilation, -1), hidden], dim=1)
+        mixed = past[:, :steps] @ taps[0].T + past[:, dilation : dilation + steps] @ taps[1].T + hidden @ taps[2].T
+        hidden = hidden + torch.relu(mixed + parameters[f"blocks.{block}.bias"])
+    result: torch.Tensor = hidden @ parameters["outlet.weight"].T + parameters["outlet.bias"]
+    return result
+
+
+def commands_below(base: Agent, streams: Streams) -> FloatArray:
+    """Commands ``(E, T, n)`` of an agent that does not look at joint angles."""
+    base.reset(len(streams))
+    result = np.empty_like(streams.base)
+    for t in range(streams.base.shape[1]):
+        q = streams.reference[:, t]
+        result[:, t] = base.act_on(read_stream(base.interface, streams, t, q, np.zeros_like(q)))
+    return result
+
+
+def _initial(shape: TcnShape, seed: int) -> dict[str, torch.Tensor]:
+    import torch
+
+    generator = torch.Generator().manual_seed(seed)
+    parameters = {}
+    for name, size in shape.shapes().items():
+        if name.endswith("bias") or name.startswith("outlet"):
+            value = torch.zeros(size)
+        else:
+            fan_in = size[-1] * (size[0] if len(size) == 3 else 1)
+            value = torch.randn(size, generator=generator) * float(np.sqrt(1.0 / fan_in))
+        parameters[name] = value.requires_grad_()
+    return parameters
+
+
+def _servo(commands: torch.Tensor, start: torch.Tensor, share: torch.Tensor) -> torch.Tensor:
+    """``q += k (c - q)`` over time; commands ``(E, T, n)``, start ``(E, n)``, share ``(E, 1)``."""
+    import torch
+
+    q, found = start, []
+    for command in commands.unbind(1):
+        q = q + share * (command - q)
+        found.append(q)
+    return torch.stack(found, dim=1)
+
+
+def _motor_shares(streams: Streams, rates: Rates, config: PredictorConfig) -> FloatArray:
+    """How far a robot with a nominal lead on top gets towards the command in one step, ``(E, 1)``."""
+    nominal = rates.lag_share
+    factor = 1.0 + config.strength * (1.0 / nominal - 1.0)
+    gains = [motors.gain for motors in streams.motors] or [1.0] * len(streams)
+    return np.array([[factor * lag_share(rates.motor_gain * gain, rates.substeps)] for gain in gains])
+
+
+def _with_mirror(interface: Interface, streams: Streams) -> Streams:
+    from syda_gym.agents.streams import join
+
+    robot, shape = interface.robot, streams.base.shape
+    mirrored = replace(
+        streams,
+        base=robot.mirror(streams.base.reshape(-1, shape[-1])).reshape(shape),
+        reference=robot.mirror(streams.reference.reshape(-1, shape[-1])).reshape(shape),
+    )
+    return join([streams, mirrored])
+
+
+def _cross(axis: FloatArray) -> FloatArray:
+    x, y, z = axis
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def _length(vectors: torch.Tensor) -> torch.Tensor:
+    return (vectors.square().sum(-1) + 1e-10).sqrt()
+
+
+def _masked(values: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
+    return (values * mask).sum() / mask.sum()
