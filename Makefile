@@ -26,7 +26,7 @@ types: $(INSTALLED)
 check: lint types test docs
 
 docs: $(INSTALLED)
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "open site/index.html"
 
 wheel: $(INSTALLED)
