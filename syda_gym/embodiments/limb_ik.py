@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from syda_gym.embodiments.arm_chain import ArmChain
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.limb_ik_single import SingleArmIK
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import EmbodimentError
 
@@ -56,10 +57,20 @@ class LimbIK:
         if not np.isfinite(wanted).all() or (norms < 1e-9).any():
             raise EmbodimentError(f"directions for {self.robot.name!r} must be finite and longer than zero")
         unit = wanted / norms
+        if len(unit) == 1 and all(arm.single is not None for arm in self._arms):
+            return self._solve_one(unit[0])
         frames = np.repeat(self.robot.rest[None], len(unit), axis=0)
         for index, arm in enumerate(self._arms):
             frames = arm.solve(frames, unit[:, index])
         return frames
+
+    def _solve_one(self, unit: FloatArray) -> FloatArray:
+        """The same for one frame, directions ``(arms, 2, 3)``, without numpy's overhead."""
+        angles: list[float] = []
+        for arm, (upper, fore) in zip(self._arms, unit.tolist(), strict=True):
+            assert arm.single is not None  # the caller looked; for the type checker
+            angles += arm.single.solve(tuple(upper), tuple(fore))
+        return self.robot.clamp(np.array(angles))
 
 
 class _ArmIK:
@@ -76,6 +87,20 @@ class _ArmIK:
         self.fore_zero = _unit(zero[2] - zero[1])
         self.movers = self._movers()
         self.closed_form = len(self.movers) >= 4 and self._two_move_the_elbow()
+        self.single = self._single() if self.closed_form else None
+
+    def _single(self) -> SingleArmIK | None:
+        """The solver for one frame, ``None`` if a limit of this arm depends on a joint of another one."""
+        inside = range(self.part.start, self.part.stop)
+        own = [row for row in self.robot._coupled if row[0] in inside]
+        if any(by not in inside for _, by, *_ in own):
+            return None
+        base = _rotations(self.axes, self.robot.rest[self.part], self.movers)
+        shift = self.part.start
+        couplings = [(joint - shift, by - shift, at, low, high) for joint, by, at, low, high in own]
+        zero = (self.upper_zero, self.fore_zero @ base.T)
+        rest = self.robot.rest[self.part]
+        return SingleArmIK(self.chain, self.axes, self.movers, self.lengths, zero, rest, couplings)
 
     def _movers(self) -> list[int]:
         """Joints that move elbow or wrist against the shoulder, at most the first four; the rest keep their angle."""
