@@ -237,9 +237,7 @@ def probability_of_improvement(
     theirs = dict(zip(_names(other), _split(sign * second, other), strict=True))
     shared = [name for name in ours if name in theirs]
     if not shared:
-        raise OptionError(
-            "the two results have no stratum (action) in common; compare runs on the same motions"
-        )
+        raise OptionError("the two results have no stratum (action) in common; compare runs on the same motions")
     pairs = [(ours[name], theirs[name]) for name in shared]
     rng = np.random.default_rng(seed)
     point = float(np.mean([_superiority(a[None], b[None])[0] for a, b in pairs]))

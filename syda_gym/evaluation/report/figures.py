@@ -1,0 +1,265 @@
+"""Bodies over time as simple solids, for the playback: humans as bones between joints, robots as their URDF's shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from syda_gym.embodiments.embodiment import Embodiment, FloatArray
+from syda_gym.embodiments.human import HumanSkeleton
+from syda_gym.embodiments.robot import Robot
+
+__all__ = ["Shape", "Track", "track"]
+
+Colour = tuple[float, float, float]
+
+# Thickness of the human figure as fractions of stature; only for looks.
+_BONES: tuple[tuple[str, str, float, str], ...] = (
+    ("Head", "Head", 0.062, "skin"), ("Head", "Neck", 0.024, "skin"),
+    ("LShoulder", "RShoulder", 0.040, "shirt"), ("LShoulder", "LHip", 0.042, "shirt"),
+    ("RShoulder", "RHip", 0.042, "shirt"), ("Neck", "Torso", 0.064, "shirt"),
+    ("Torso", "LHip", 0.050, "shirt"), ("Torso", "RHip", 0.050, "shirt"), ("LHip", "RHip", 0.050, "trousers"),
+    ("LShoulder", "LElbow", 0.027, "shirt"), ("LElbow", "LHand", 0.021, "skin"), ("LHand", "LHand", 0.028, "skin"),
+    ("RShoulder", "RElbow", 0.027, "shirt"), ("RElbow", "RHand", 0.021, "skin"), ("RHand", "RHand", 0.028, "skin"),
+    ("LHip", "LKnee", 0.038, "trousers"), ("LKnee", "LFoot", 0.030, "trousers"),
+    ("RHip", "RKnee", 0.038, "trousers"), ("RKnee", "RFoot", 0.030, "trousers"),
+)  # fmt: skip
+_COLOURS: dict[str, Colour] = {
+    "skin": (0.91, 0.73, 0.60), "shirt": (0.25, 0.50, 0.78), "trousers": (0.26, 0.30, 0.40),
+}  # fmt: skip
+_ROBOT_COLOUR: Colour = (0.85, 0.85, 0.87)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One solid.
+
+    Attributes:
+        kind: ``"bone"`` (a capsule between two points), ``"sphere"``, ``"cylinder"`` (along z) or ``"box"``.
+        size: bone and sphere: radius; cylinder: radius and length; box: three sides [m].
+        colour: red, green, blue in 0..1.
+        points: the two points of a bone.
+        pose: index of the moving pose that carries the solid; -1 if it stands still.
+        position: of the solid in the frame of its pose [m].
+        rotation: of the solid in the frame of its pose, quaternion scalar-last.
+    """
+
+    kind: str
+    size: tuple[float, ...]
+    colour: Colour
+    points: tuple[int, int] = (0, 0)
+    pose: int = -1
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rotation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One body over time, standing on the floor (z = 0), x forward, y left.
+
+    Attributes:
+        name: the body's name.
+        kind: ``"human"`` or ``"robot"``.
+        shapes: the solids.
+        points: ``(N, P, 3)`` points that bones join [m].
+        poses: ``(N, L, 7)`` position [m] and quaternion (scalar-last) of each moving link.
+        height: of the body [m].
+    """
+
+    name: str
+    kind: str
+    shapes: tuple[Shape, ...]
+    points: FloatArray
+    poses: FloatArray
+    height: float
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+def track(body: Embodiment, frames: ArrayLike) -> Track:
+    """Poses a body's solids for every frame.
+
+    Args:
+        body: a human or a robot.
+        frames: ``(N, F)`` of that body.
+
+    Raises:
+        EmbodimentError: the frames do not fit the body.
+    """
+    checked = body.check(frames)
+    if isinstance(body, Robot):
+        return _robot_track(body, checked)
+    return _human_track(body, checked)
+
+
+def _human_track(body: Embodiment, frames: FloatArray) -> Track:
+    if isinstance(body, HumanSkeleton):
+        joints = body.complete(frames)
+        bones: Sequence[tuple[str, str, float, str]] = [b for b in _BONES if b[0] in joints and b[1] in joints]
+        height, feet = body.height, [name for name in joints if name.endswith("Foot")]
+    else:  # a body of the user's that is neither: its arms alone
+        arms = body.arm_points(frames)
+        joints = {
+            f"{side}{part}": arms[:, i, p]
+            for i, side in enumerate("LR"[: arms.shape[1]])
+            for p, part in enumerate(("Shoulder", "Elbow", "Hand"))
+        }
+        bones = [b for b in _BONES if b[0] in joints and b[1] in joints]
+        height, feet = 3.0 * body.reach, list(joints)
+    names = list(joints)
+    points = np.stack([joints[name] for name in names], axis=1)
+    floor = np.median(np.min(np.stack([joints[name][:, 2] for name in feet], axis=1), axis=1)) - 0.03 * height
+    middle = np.median(points[:, :, :2].mean(axis=1), axis=0)
+    points = points - np.array([*middle, floor])
+    shapes = tuple(
+        Shape("bone", (radius * height,), _COLOURS[colour], (names.index(a), names.index(b)))
+        for a, b, radius, colour in bones
+    )
+    return Track(body.name, body.kind, shapes, points, np.zeros((len(points), 0, 7)), height)
+
+
+def _robot_track(robot: Robot, frames: FloatArray) -> Track:
+    model = _robot_model(robot)
+    poses = model.poses(frames)
+    poses[:, :, 2] -= model.floor
+    return Track(robot.name, robot.kind, model.shapes, np.zeros((len(frames), 0, 3)), poses, robot.height)
+
+
+class _RobotModel:
+    """The URDF of a robot with its solids sorted into those that move with the arms and those that stand still."""
+
+    def __init__(self, robot: Robot) -> None:
+        import yourdfpy
+
+        from syda_gym.embodiments.urdf import read_urdf
+
+        self._robot = robot
+        self._model = read_urdf(robot.urdf).model
+        self._data = self._model.createData()
+        urdf = yourdfpy.URDF.load(
+            str(robot.urdf), build_scene_graph=False, load_meshes=False, build_collision_scene_graph=False
+        )
+        rest = self.place(robot.rest)
+        probe = self.place(np.clip(robot.rest + 0.3, robot.lower, robot.upper))
+        self.links = [name for name in rest if name in urdf.link_map and not np.allclose(rest[name], probe[name])]
+        shapes = []
+        for name, link in urdf.link_map.items():
+            if name in rest:
+                carrier = self.links.index(name) if name in self.links else -1
+                frame = np.eye(4) if carrier >= 0 else rest[name]
+                shapes += [_shape(solid, frame, carrier) for solid in _solids(link)]
+        still = [shape.position[2] - _half_height(shape) for shape in shapes if shape.pose < 0]
+        self.floor = float(min(still, default=min(rest[name][2, 3] for name in rest)))
+        self.shapes = tuple(
+            shape if shape.pose >= 0 else Shape(
+                shape.kind, shape.size, shape.colour, pose=-1, rotation=shape.rotation,
+                position=(shape.position[0], shape.position[1], shape.position[2] - self.floor),
+            )
+            for shape in shapes
+        )  # fmt: skip
+
+    def poses(self, frames: FloatArray) -> FloatArray:
+        """Position and quaternion of each moving link in the torso frame, ``(N, L, 7)``."""
+        from scipy.spatial.transform import Rotation
+
+        ids = [self._model.getBodyId(name) for name in self.links]
+        torso = self._model.getBodyId(self._robot.description.torso)
+        positions = np.zeros((len(frames), len(ids), 3))
+        rotations = np.zeros((len(frames), len(ids), 3, 3))
+        for row, frame in enumerate(frames):
+            self._move(frame)
+            inverse = self._data.oMf[torso].inverse()
+            for column, index in enumerate(ids):
+                pose = inverse * self._data.oMf[index]
+                positions[row, column], rotations[row, column] = pose.translation, pose.rotation
+        turns = Rotation.from_matrix(rotations.reshape(-1, 3, 3)).as_quat().reshape(len(frames), -1, 4)
+        return np.concatenate([positions, turns], axis=2)
+
+    def _move(self, frame: FloatArray) -> None:
+        import pinocchio
+
+        q = pinocchio.neutral(self._model)
+        angles = {**self._robot.description.rest, **dict(zip(self._robot.joint_names, frame, strict=True))}
+        for name, angle in angles.items():
+            if self._model.existJointName(name):
+                joint = self._model.joints[self._model.getJointId(name)]
+                if joint.nq == 1:
+                    q[joint.idx_q] = float(angle)
+        pinocchio.framesForwardKinematics(self._model, self._data, q)
+
+    def place(self, frame: FloatArray) -> dict[str, FloatArray]:
+        """Homogeneous transforms of all links in the torso frame, joints that are no arm joints at rest."""
+        import pinocchio
+
+        self._move(frame)
+        placed = {
+            item.name: np.array(self._data.oMf[index].homogeneous)
+            for index, item in enumerate(self._model.frames)
+            if item.type == pinocchio.FrameType.BODY
+        }
+        inverse = np.linalg.inv(placed[self._robot.description.torso])
+        return {name: inverse @ pose for name, pose in placed.items()}
+
+
+@lru_cache(maxsize=32)
+def _robot_model(robot: Robot) -> _RobotModel:
+    return _RobotModel(robot)
+
+
+def _solids(link: Any) -> list[Any]:
+    """The link's visible primitives, or its collision primitives where it is drawn by meshes."""
+    for group in (link.visuals, link.collisions):
+        found = [
+            item
+            for item in group
+            if item.geometry is not None and (item.geometry.sphere or item.geometry.cylinder or item.geometry.box)
+        ]
+        if found:
+            return found
+    return []
+
+
+def _shape(solid: Any, frame: FloatArray, carrier: int) -> Shape:
+    from scipy.spatial.transform import Rotation
+
+    pose = frame @ (np.eye(4) if solid.origin is None else np.asarray(solid.origin, dtype=np.float64))
+    geometry = solid.geometry
+    if geometry.sphere:
+        kind, size = "sphere", (float(geometry.sphere.radius),)
+    elif geometry.cylinder:
+        kind, size = "cylinder", (float(geometry.cylinder.radius), float(geometry.cylinder.length))
+    else:
+        kind, size = "box", tuple(float(side) for side in geometry.box.size)
+    turn = Rotation.from_matrix(pose[:3, :3]).as_quat()
+    return Shape(
+        kind,
+        size,
+        _colour(solid),
+        pose=carrier,
+        position=(float(pose[0, 3]), float(pose[1, 3]), float(pose[2, 3])),
+        rotation=(float(turn[0]), float(turn[1]), float(turn[2]), float(turn[3])),
+    )
+
+
+def _colour(solid: Any) -> Colour:
+    material = getattr(solid, "material", None)
+    rgba = None if material is None or material.color is None else material.color.rgba
+    return _ROBOT_COLOUR if rgba is None else (float(rgba[0]), float(rgba[1]), float(rgba[2]))
+
+
+def _half_height(shape: Shape) -> float:
+    """Half of the extent along z of a solid that stands still."""
+    from scipy.spatial.transform import Rotation
+
+    up = np.abs(Rotation.from_quat(shape.rotation).as_matrix()[2])
+    if shape.kind == "sphere":
+        return shape.size[0]
+    if shape.kind == "cylinder":
+        return float(up[2] * shape.size[1] / 2 + np.sqrt(max(0.0, 1 - up[2] ** 2)) * shape.size[0])
+    return float(up @ np.array(shape.size) / 2)

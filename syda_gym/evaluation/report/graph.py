@@ -1,0 +1,99 @@
+"""The graph of fitted pairs as inline SVG: humans on the left half of a circle, robots on the right."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+
+from syda_gym.evaluation.report.model import RouteEdge, RouteGraph
+
+__all__ = ["graph_svg"]
+
+_WIDTH, _HEIGHT, _NODE = 720.0, 400.0, 34.0
+_MOST_LABELS = 30
+
+
+def graph_svg(graph: RouteGraph) -> str:
+    """Draws bodies as circles and fitted pairs as arrows, thicker where transferability is higher.
+
+    The chosen route is drawn in the accent colour. With many edges their labels are left to the pointer.
+    """
+    places = _places(graph)
+    chosen = set(zip(graph.chosen[:-1], graph.chosen[1:], strict=True))
+    node = _NODE if len(places) <= 10 else max(12.0, 300.0 / len(places))
+    ordered = sorted(graph.edges, key=lambda edge: (edge.source, edge.target) in chosen)
+    labels = len(ordered) <= _MOST_LABELS
+    parts = [
+        _edge(edge, places, node, (edge.source, edge.target) in chosen, labels) for edge in ordered
+    ] + [
+        _node(name, kind, *places[name], node, name in graph.chosen) for name, kind in graph.bodies.items()
+    ]  # fmt: skip
+    heads = "".join(
+        f'<marker id="{name}" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="{size}" markerHeight="{size}" '
+        f'markerUnits="userSpaceOnUse" orient="auto"><path d="M0 1L10 5L0 9z" fill="{colour}"/></marker>'
+        for name, colour, size in (("head", "var(--soft)", 10), ("head-chosen", "var(--accent)", 13))
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" '
+        f'aria-label="{escape(graph.title, quote=True)}" class="graph"><defs>{heads}</defs>{"".join(parts)}</svg>'
+    )
+
+
+def _places(graph: RouteGraph) -> dict[str, tuple[float, float]]:
+    """Positions on an ellipse: humans over the left half, robots over the right one, in the order given."""
+    humans = [name for name, kind in graph.bodies.items() if kind == "human"]
+    robots = [name for name in graph.bodies if name not in humans]
+    places: dict[str, tuple[float, float]] = {}
+    for names, side in ((humans, -1.0), (robots, 1.0)):
+        for index, name in enumerate(names):
+            angle = math.pi * ((index + 0.5) / len(names) - 0.5)
+            x = _WIDTH / 2 + side * (_WIDTH / 2 - 90) * math.cos(angle)
+            places[name] = (x, _HEIGHT / 2 + (_HEIGHT / 2 - 60) * math.sin(angle))
+    return places
+
+
+def _edge(edge: RouteEdge, places: dict[str, tuple[float, float]], node: float, chosen: bool, label: bool) -> str:
+    (x0, y0), (x1, y1) = places[edge.source], places[edge.target]
+    length = math.hypot(x1 - x0, y1 - y0) or 1.0
+    ux, uy = (x1 - x0) / length, (y1 - y0) / length
+    bend = 0.12 * length  # the two directions of a pair bend apart
+    cx, cy = (x0 + x1) / 2 - uy * bend, (y0 + y1) / 2 + ux * bend
+    start, end = _towards((x0, y0), (cx, cy), node), _towards((x1, y1), (cx, cy), node + 3)
+    colour, head = ("var(--accent)", "head-chosen") if chosen else ("var(--soft)", "head")
+    width = 1.0 + 4.0 * max(0.0, min(1.0, edge.transferability))
+    error = "" if edge.error is None else f", error {100 * edge.error:.1f} cm"
+    words = f"{edge.source} to {edge.target}: T = {edge.transferability:.3f}{error}"
+    text = ""
+    if label:
+        # A point on the curve near its start, where arrows of other pairs do not cross.
+        t = 0.36
+        lx = (1 - t) ** 2 * start[0] + 2 * t * (1 - t) * cx + t**2 * end[0]
+        ly = (1 - t) ** 2 * start[1] + 2 * t * (1 - t) * cy + t**2 * end[1]
+        text = (
+            f'<text x="{lx:.1f}" y="{ly + 4:.1f}" text-anchor="middle" class="edge-label">'
+            f"{edge.transferability:.2f}</text>"
+        )
+    return (
+        f'<g><path d="M{start[0]:.1f} {start[1]:.1f}Q{cx:.1f} {cy:.1f} {end[0]:.1f} {end[1]:.1f}" fill="none" '
+        f'stroke="{colour}" stroke-width="{width:.2f}" opacity="{0.95 if chosen else 0.5}" '
+        f'marker-end="url(#{head})"><title>{escape(words)}</title></path>{text}</g>'
+    )
+
+
+def _towards(point: tuple[float, float], other: tuple[float, float], distance: float) -> tuple[float, float]:
+    length = math.hypot(other[0] - point[0], other[1] - point[1]) or 1.0
+    return (
+        point[0] + distance * (other[0] - point[0]) / length,
+        point[1] + distance * (other[1] - point[1]) / length,
+    )
+
+
+def _node(name: str, kind: str, x: float, y: float, radius: float, chosen: bool) -> str:
+    style = "node chosen" if chosen else "node"
+    inside = radius >= 26 and len(name) <= 9
+    label = y + 4 if inside else y + radius + 15
+    return (
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}" class="{style} {escape(kind, quote=True)}">'
+        f"<title>{escape(name)} ({escape(kind)})</title></circle>"
+        f'<text x="{x:.1f}" y="{label:.1f}" text-anchor="middle">{escape(name)}</text>'
+    )
