@@ -1,4 +1,4 @@
-"""Bodies over time as simple solids, for the playback: humans as bones between joints, robots as their URDF's shapes."""
+"""Bodies over time as simple solids: humans as bones between joints, robots as the shapes of their URDF."""
 
 from __future__ import annotations
 
@@ -230,6 +230,7 @@ def _shape(solid: Any, frame: FloatArray, carrier: int) -> Shape:
 
     pose = frame @ (np.eye(4) if solid.origin is None else np.asarray(solid.origin, dtype=np.float64))
     geometry = solid.geometry
+    size: tuple[float, ...]
     if geometry.sphere:
         kind, size = "sphere", (float(geometry.sphere.radius),)
     elif geometry.cylinder:

@@ -155,14 +155,14 @@ def _head(column: Column, numeric: bool) -> str:
 
 def _cell(cell: Cell, column: Column) -> str:
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
-        return '<td class="number" data-v="">–</td>'
+        return '<td class="number" data-v="">&ndash;</td>'
     if isinstance(cell, bool):
         return f'<td data-v="{int(cell)}">{"yes" if cell else "no"}</td>'
     if isinstance(cell, str):
         return f"<td>{escape(cell)}</td>"
     if isinstance(cell, Estimate):
         if math.isnan(cell.value):
-            return '<td class="number" data-v="">–</td>'
+            return '<td class="number" data-v="">&ndash;</td>'
         value, low, high = (number * column.scale for number in (cell.value, cell.low, cell.high))
         interval = f'<span class="interval">[{low:.{column.digits}f}, {high:.{column.digits}f}]</span>'
         return f'<td class="number" data-v="{value:.8g}">{value:.{column.digits}f} {interval}</td>'
