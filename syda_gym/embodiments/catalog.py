@@ -55,12 +55,16 @@ def get(name: str) -> Embodiment:
 
 
 def resolve(body: str | os.PathLike[str] | Embodiment) -> Embodiment:
-    """Accepts a body, its name, or the path of a robot description (``.yaml``)."""
+    """Accepts a body, its name, or the path of a robot description (``.yaml``) or of a URDF, whose arms are found."""
     if isinstance(body, Embodiment):
         return body
     text = os.fspath(body)
     if text.endswith((".yaml", ".yml")):
         return Robot.read(text)
+    if text.endswith(".urdf"):
+        from syda_gym.embodiments.discovery import discover_robot
+
+        return discover_robot(text)
     return get(text)
 
 

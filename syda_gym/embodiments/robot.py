@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -56,7 +56,20 @@ class CoupledLimit:
 
 @dataclass(frozen=True)
 class RobotDescription:
-    """The small hand-editable YAML beside a URDF: everything that the URDF alone does not say."""
+    """The small hand-editable YAML beside a URDF: everything that the URDF alone does not say.
+
+    Attributes:
+        name: name in the catalog.
+        urdf: the URDF file.
+        torso: link in whose frame landmarks are expressed.
+        height: stature [m].
+        arms: one or two.
+        coupled_limits: limits that depend on another joint.
+        rest: joint name to angle [rad] of the pose to start from; 0 where absent.
+        disabled_collisions: pairs of links whose contact does not count.
+        axes: rows of the rotation from the torso link's frame to body axes (x forward, y left, z up); ``None`` if the
+            link has body axes already, as most do.
+    """
 
     name: str
     urdf: Path
@@ -66,6 +79,7 @@ class RobotDescription:
     coupled_limits: tuple[CoupledLimit, ...] = ()
     rest: Mapping[str, float] = field(default_factory=dict)
     disabled_collisions: tuple[tuple[str, str], ...] = ()
+    axes: tuple[tuple[float, float, float], ...] | None = None
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> RobotDescription:
@@ -82,7 +96,7 @@ class RobotDescription:
         except (yaml.YAMLError, UnicodeDecodeError) as error:
             raise EmbodimentError(f"{file} is not valid YAML: {error}") from error
         needed = {"name", "urdf", "torso", "height", "arms"}
-        allowed = needed | {"coupled_limits", "rest", "disabled_collisions"}
+        allowed = needed | {"coupled_limits", "rest", "disabled_collisions", "axes"}
         if not isinstance(data, dict) or not needed <= set(data):
             raise EmbodimentError(f"{file}: expected the keys {sorted(needed)}, got {data and sorted(data)}")
         for key in set(data) - allowed:
@@ -100,6 +114,7 @@ class RobotDescription:
                 ),
                 rest={str(k): float(v) for k, v in (data.get("rest") or {}).items()},
                 disabled_collisions=tuple((a, b) for a, b in data.get("disabled_collisions") or ()),
+                axes=_rotation_rows(data["axes"]) if data.get("axes") else None,
             )
         except (TypeError, KeyError, ValueError) as error:
             raise EmbodimentError(f"{file}: a wrong value or key: {error}; see docs for the format") from error
@@ -141,6 +156,9 @@ class Robot(Embodiment):
             arm_chain(tree, description.torso, arm.side, arm.joints, (arm.shoulder, arm.elbow, arm.wrist, arm.tip))
             for arm in arms
         )
+        if description.axes is not None:
+            turn = np.array(description.axes)
+            self.chains = tuple(_in_body_axes(chain, turn) for chain in self.chains)
         starts = np.cumsum([0, *[chain.n_joints for chain in self.chains]])
         self.arm_slices = tuple(slice(int(a), int(b)) for a, b in zip(starts[:-1], starts[1:], strict=True))
         self._coupled = tuple(
@@ -271,6 +289,24 @@ class Robot(Embodiment):
         }
 
 
+def _rotation_rows(value: Any) -> tuple[tuple[float, float, float], ...]:
+    rows = np.asarray(value, dtype=np.float64)
+    if rows.shape != (3, 3) or not np.allclose(rows @ rows.T, np.eye(3), atol=1e-6) or np.linalg.det(rows) < 0.0:
+        raise ValueError(f"axes must be the three rows of a rotation, got {value}")
+    return tuple((float(x), float(y), float(z)) for x, y, z in rows)
+
+
+def _in_body_axes(chain: ArmChain, turn: FloatArray) -> ArmChain:
+    """The same arm seen from a torso frame turned by ``turn``."""
+    fixed = np.array([joint < 0 for joint in chain.point_joints])[:, None]
+    return replace(
+        chain,
+        rotations=np.concatenate([(turn @ chain.rotations[0])[None], chain.rotations[1:]]),
+        offsets=np.concatenate([(turn @ chain.offsets[0])[None], chain.offsets[1:]]),
+        point_offsets=np.where(fixed, chain.point_offsets @ turn.T, chain.point_offsets),
+    )
+
+
 def select_sides(robot: Robot, sides: Sequence[Side]) -> RobotDescription:
     """A description of the same robot with only some of its arms (for one-armed studies)."""
     arms = tuple(arm for arm in robot.description.arms if arm.side in sides)
@@ -283,4 +319,5 @@ def select_sides(robot: Robot, sides: Sequence[Side]) -> RobotDescription:
         coupled_limits=robot.description.coupled_limits,
         rest=robot.description.rest,
         disabled_collisions=robot.description.disabled_collisions,
+        axes=robot.description.axes,
     )

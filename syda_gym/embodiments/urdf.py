@@ -13,7 +13,7 @@ from syda_gym.embodiments.arm_chain import ArmChain
 from syda_gym.embodiments.embodiment import FloatArray, Side
 from syda_gym.errors import EmbodimentError, nearest_name
 
-__all__ = ["JointLimits", "UrdfTree", "arm_chain", "read_urdf"]
+__all__ = ["JointLimits", "UrdfTree", "arm_chain", "read_urdf", "zero_placements"]
 
 _MAX_URDF_BYTES = 32 * 2**20
 
@@ -136,7 +136,7 @@ def arm_chain(
     for name in joints:
         if tree.joint(name).type not in ("revolute", "continuous"):
             raise EmbodimentError(f"{tree.path.name}: arm joint {name!r} is {tree.joint(name).type}, not revolute")
-    placements = _zero_placements(tree)
+    placements = zero_placements(tree)
     inverse_torso = np.linalg.inv(placements[torso])
     frames = [inverse_torso @ placements[tree.joints[name].child] for name in joints]
     for before, after in zip(joints[:-1], joints[1:], strict=True):
@@ -170,7 +170,7 @@ def _carrier(tree: UrdfTree, joints: Sequence[str], link: str) -> int:
     return max(above, default=-1)
 
 
-def _zero_placements(tree: UrdfTree) -> dict[str, FloatArray]:
+def zero_placements(tree: UrdfTree) -> dict[str, FloatArray]:
     """Homogeneous transforms of every link at the zero configuration, by pinocchio."""
     import pinocchio
 
