@@ -71,5 +71,5 @@ def test_bad_input() -> None:
     with pytest.raises(OptionError, match="two bodies"):
         suggest(["adult"])
     with pytest.raises(RouteError, match="none of the bodies"):
-        suggest(["adult", "kid"], demands=[("adult", "pepper")])
-    assert suggest(["adult", "kid"], [("adult", "kid")]) == []
+        suggest(["adult", "kid"], demands=[("adult", "pepper")], **FAST)
+    assert suggest(["adult", "kid"], [("adult", "kid")], **FAST) == []
