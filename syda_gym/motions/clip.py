@@ -324,6 +324,7 @@ class Motions:
         bodies: body name to embodiment.
         families: action to its family (reach, wave, ...), where known.
         synthetic: whether the motions were generated rather than recorded.
+        notes: what a reader found out about a recording: units, axes, gaps and how they were filled.
     """
 
     name: str
@@ -331,6 +332,7 @@ class Motions:
     bodies: Mapping[str, Embodiment]
     families: Mapping[str, str] = field(default_factory=dict)
     synthetic: bool = False
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.takes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -13,8 +14,13 @@ import numpy as np
 from syda_gym.errors import MotionError, OptionError, nearest_name
 from syda_gym.files import asset
 from syda_gym.motions.clip import Motions, Take
+from syda_gym.motions.readers.bvh import is_bvh, read_bvh
+from syda_gym.motions.readers.kinect import is_kinect, read_kinect
+from syda_gym.motions.readers.mediapipe import is_mediapipe, read_mediapipe
 from syda_gym.motions.readers.npz import read_npz
+from syda_gym.motions.readers.openni import is_openni, read_openni
 from syda_gym.motions.readers.paper import read_paper
+from syda_gym.motions.readers.text import first_bytes
 
 __all__ = ["FORMATS", "Format", "load_motions", "resampled"]
 
@@ -26,12 +32,14 @@ class Format:
     Attributes:
         name: the prefix in ``format:PATH``.
         description: one line for people.
+        endings: how files of this format usually end.
         read: from a path to motions, at the recording's own frame rate.
         matches: whether a path looks like this format, by ending and content.
     """
 
     name: str
     description: str
+    endings: tuple[str, ...]
     read: Callable[[Path], Motions]
     matches: Callable[[Path], bool]
 
@@ -123,6 +131,9 @@ def _format_and_path(text: str) -> tuple[Format, Path]:
     for chosen in FORMATS.values():
         if chosen.matches(path):
             return chosen, path
+    for chosen in FORMATS.values():
+        if path.suffix.lower() in chosen.endings:  # not what its ending says: its reader knows what is wrong with it
+            return chosen, path
     raise MotionError(f"{path} is of no known format ({', '.join(FORMATS)}); name it as format:PATH")
 
 
@@ -131,14 +142,24 @@ def _is_paper(path: Path) -> bool:
 
 
 def _is_npz(path: Path) -> bool:
-    return path.suffix == ".npz" and path.is_file()
+    if first_bytes(path, 2) != b"PK":
+        return False
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return "meta.npy" in archive.namelist()
+    except (OSError, zipfile.BadZipFile):
+        return path.suffix == ".npz"
 
 
 FORMATS: dict[str, Format] = {
     entry.name: entry
     for entry in (
-        Format("paper", "the folder of the paper's workbooks", read_paper, _is_paper),
-        Format("npz", "a file written by save_motions", read_npz, _is_npz),
+        Format("paper", "the folder of the paper's workbooks", (), read_paper, _is_paper),
+        Format("npz", "a file written by save_motions", (".npz",), read_npz, _is_npz),
+        Format("bvh", "motion capture, joints found by name", (".bvh",), read_bvh, is_bvh),
+        Format("kinect", "Kinect v2: timestamp and 25 joints a line", (".csv",), read_kinect, is_kinect),
+        Format("openni", "OpenNI / Kinect v1: 15 joints a line", (".txt", ".skeleton"), read_openni, is_openni),
+        Format("mediapipe", "world landmarks as JSON, CSV or npz", (".json", ".jsonl"), read_mediapipe, is_mediapipe),
     )
 }
-"""Known formats by prefix."""
+"""Known formats by prefix, in the order in which a file is tried."""

@@ -64,7 +64,7 @@ def save_motions(motions: Motions, path: str | os.PathLike[str], *, steps: Mappi
     if stamped:
         arrays["timestamps"] = np.concatenate(stamped)
     order = list(motions.bodies)
-    meta = {
+    meta: dict[str, Any] = {
         "format": FORMAT,
         "name": motions.name,
         "synthetic": motions.synthetic,
@@ -83,6 +83,8 @@ def save_motions(motions: Motions, path: str | os.PathLike[str], *, steps: Mappi
             for take in motions.takes
         ],
     }
+    if motions.notes:
+        meta["notes"] = list(motions.notes)
     arrays["meta"] = np.frombuffer(json.dumps(meta, sort_keys=True).encode(), dtype=np.uint8)
     with atomic_path(path) as temporary:
         _write(temporary, arrays)
@@ -112,7 +114,8 @@ def read_npz(path: str | os.PathLike[str]) -> Motions:
         filled = [_unpack(file, arrays.get(f"filled_{index}"), values) for index, values in enumerate(frames)]
         takes = _takes(file, meta["takes"], list(bodies), frames, filled, arrays.get("timestamps"))
         families = {str(key): str(value) for key, value in meta["families"].items()}
-        return Motions(str(meta["name"]), takes, bodies, families, bool(meta["synthetic"]))
+        notes = tuple(str(note) for note in meta.get("notes", ()))
+        return Motions(str(meta["name"]), takes, bodies, families, bool(meta["synthetic"]), notes)
     except (MotionError, EmbodimentError):
         raise
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError, RecursionError) as error:
