@@ -18,6 +18,7 @@ from syda_gym.embodiments.embodiment import FloatArray
 __all__ = ["SingleArmIK"]
 
 Vector = tuple[float, float, float]
+Swept = tuple[list[Vector], list[Vector], list[Vector]]
 Couplings = Sequence[tuple[int, int, FloatArray, FloatArray, FloatArray]]
 
 _EXACT = 1e-7  # m, as in limb_ik
@@ -59,36 +60,58 @@ class SingleArmIK:
         self.couplings = [(j, by, at.tolist(), low.tolist(), high.tolist()) for j, by, at, low, high in couplings]
         self.carriers = chain.point_joints[:3]
         self._plan = _plan(chain, axes)
+        self.exact = self._is_exact()
 
     def solve(self, upper: Vector, fore: Vector) -> list[float]:
         """Joint angles [rad] of the arm for unit directions of upper arm and forearm in the torso frame."""
+        candidates = self._candidates(upper, fore)
+        clamped = [self._clamped(angles) for angles, _ in candidates]
+        if self.exact:
+            solved = [a for (b, real), a in zip(candidates, clamped, strict=True) if real and a == b]
+            if solved:
+                return min(solved, key=self._pull)
         goal_elbow = _scaled(upper, self.lengths[0])
         goal = (*goal_elbow, *_sum(goal_elbow, _scaled(fore, self.lengths[1])))
         best, least, miss = self.rest, math.inf, math.inf
-        for candidate in self._candidates(upper, fore):
-            angles = self._clamped(candidate)
-            error = math.sqrt(_squared(self._residual(angles, goal)))
-            # A tiny pull towards rest makes the choice among equally good solutions unique.
-            score = error + 1e-6 * sum([abs(a - r) for a, r in zip(angles, self.rest, strict=True)])
+        for angles in clamped:
+            error = math.sqrt(_squared(_residual(_sweep(self._plan, angles)[0], goal)))
+            score = error + self._pull(angles)
             if score < least:
                 best, least, miss = angles, score, error
         return best if miss <= _EXACT else self._refine(best, goal)
 
-    def _candidates(self, upper: Vector, fore: Vector) -> list[list[float]]:
+    def _is_exact(self) -> bool:
+        """Whether the closed form leaves no error: the last two movers then turn the forearm about the elbow."""
+        rng = np.random.default_rng(0)
+        for directions in rng.normal(size=(8, 2, 3)):
+            upper, fore = (tuple((d / np.linalg.norm(d)).tolist()) for d in directions)
+            goal_elbow = _scaled(upper, self.lengths[0])
+            goal = (*goal_elbow, *_sum(goal_elbow, _scaled(fore, self.lengths[1])))
+            for angles, real in self._candidates(upper, fore):
+                if real and _squared(_residual(_sweep(self._plan, angles)[0], goal)) > _EXACT**2:
+                    return False
+        return True
+
+    def _pull(self, angles: list[float]) -> float:
+        """A tiny pull towards rest makes the choice among equally good solutions unique."""
+        return 1e-6 * sum([abs(a - r) for a, r in zip(angles, self.rest, strict=True)])
+
+    def _candidates(self, upper: Vector, fore: Vector) -> list[tuple[list[float], bool]]:
+        """The four solutions without regard to limits, and whether each is one rather than the nearest to one."""
         w0, w1, w2, w3 = (self.axes[joint] for joint in self.movers)
         j0, j1, j2, j3 = self.movers
         found = []
         for first in (1.0, -1.0):
-            a0, a1 = _subproblem_two(w0, w1, self.upper_zero, upper, first)
+            a0, a1, real_upper = _subproblem_two(w0, w1, self.upper_zero, upper, first)
             turned = _turned(w1, -a1, _turned(w0, -a0, fore))
             for second in (1.0, -1.0):
-                a2, a3 = _subproblem_two(w2, w3, self.fore_zero, turned, second)
+                a2, a3, real_fore = _subproblem_two(w2, w3, self.fore_zero, turned, second)
                 angles = self.rest.copy()
                 angles[j0], angles[j1], angles[j2], angles[j3] = a0, a1, a2, a3
                 for joint in self.movers:
                     middle = 0.5 * (self.lower[joint] + self.upper[joint])
                     angles[joint] = middle + (angles[joint] - middle + math.pi) % (2.0 * math.pi) - math.pi
-                found.append(angles)
+                found.append((angles, real_upper and real_fore))
         return found
 
     def _limits(self, angles: list[float]) -> tuple[list[float], list[float]]:
@@ -107,20 +130,9 @@ class SingleArmIK:
         lower, upper = self._limits(inside)
         return [min(max(a, low), high) for a, low, high in zip(inside, lower, upper, strict=True)]
 
-    def _residual(self, angles: list[float], goal: tuple[float, ...]) -> tuple[float, ...]:
-        shoulder, elbow, wrist = _sweep(self._plan, angles)[0]
-        return (
-            elbow[0] - shoulder[0] - goal[0],
-            elbow[1] - shoulder[1] - goal[1],
-            elbow[2] - shoulder[2] - goal[2],
-            wrist[0] - shoulder[0] - goal[3],
-            wrist[1] - shoulder[1] - goal[4],
-            wrist[2] - shoulder[2] - goal[5],
-        )
-
-    def _columns(self, angles: list[float]) -> list[tuple[float, ...]]:
+    def _columns(self, swept: Swept) -> list[tuple[float, ...]]:
         """Derivatives of elbow and wrist against the shoulder with respect to each mover, six numbers each."""
-        points, origins, axes = _sweep(self._plan, angles)
+        points, origins, axes = swept
         columns: list[tuple[float, ...]] = []
         for joint in self.movers:
             speeds = [
@@ -132,9 +144,9 @@ class SingleArmIK:
 
     def _refine(self, angles: list[float], goal: tuple[float, ...]) -> list[float]:
         """Projected Levenberg-Marquardt on elbow and wrist [m], as in ``limb_ik`` but for one frame."""
-        residual = self._residual(angles, goal)
+        swept = _sweep(self._plan, angles)
+        residual, columns = _residual(swept[0], goal), self._columns(swept)
         cost, damping = _squared(residual), 1e-4
-        columns = self._columns(angles)
         for _ in range(_STEPS):
             lower, upper = self._limits(angles)
             free, gradient = [], []
@@ -153,7 +165,8 @@ class SingleArmIK:
             for index, move in zip(free, step, strict=True):
                 trial[self.movers[index]] += move
             trial = self._clamped(trial)
-            new_residual = self._residual(trial, goal)
+            swept = _sweep(self._plan, trial)
+            new_residual = _residual(swept[0], goal)
             new_cost = _squared(new_residual)
             gain = cost - new_cost
             if gain <= 1e-12 and damping > 10.0:
@@ -162,7 +175,7 @@ class SingleArmIK:
             damping = min(max(damping * (0.2 if gain > max(0.0, promised) else 5.0), 1e-7), 1e2)
             if gain > 0.0:
                 angles, residual, cost = trial, new_residual, new_cost
-                columns = self._columns(angles)
+                columns = self._columns(swept)
         return angles
 
 
@@ -203,9 +216,7 @@ def _plan(chain: ArmChain, axes: FloatArray) -> tuple[list[tuple[int, Vector]], 
     return still, [_Joint(tuple(steps[i].tolist()), tuple(axes[i].tolist()), carried[i]) for i in range(last + 1)]
 
 
-def _sweep(
-    plan: tuple[list[tuple[int, Vector]], list[_Joint]], angles: list[float]
-) -> tuple[list[Vector], list[Vector], list[Vector]]:
+def _sweep(plan: tuple[list[tuple[int, Vector]], list[_Joint]], angles: list[float]) -> Swept:
     """Shoulder, elbow and wrist; origin and axis of every joint; all in the torso frame."""
     points: list[Vector] = [(0.0, 0.0, 0.0)] * 3
     origins: list[Vector] = []
@@ -267,6 +278,19 @@ def _sweep(
     return points, origins, axes
 
 
+def _residual(points: list[Vector], goal: tuple[float, ...]) -> tuple[float, ...]:
+    """Elbow and wrist against the shoulder, minus where they should be."""
+    (sx, sy, sz), elbow, wrist = points
+    return (
+        elbow[0] - sx - goal[0],
+        elbow[1] - sy - goal[1],
+        elbow[2] - sz - goal[2],
+        wrist[0] - sx - goal[3],
+        wrist[1] - sy - goal[4],
+        wrist[2] - sz - goal[5],
+    )
+
+
 def _damped_step(columns: list[tuple[float, ...]], gradient: list[float], damping: float) -> list[float]:
     """Solves (J^T J + damping I) step = -gradient by Cholesky's method; at most four unknowns."""
     count = len(columns)
@@ -293,21 +317,27 @@ def _damped_step(columns: list[tuple[float, ...]], gradient: list[float], dampin
     return step
 
 
-def _subproblem_two(first: Vector, second: Vector, start: Vector, goal: Vector, sign: float) -> tuple[float, float]:
-    """Angles with R(first, a) R(second, b) start = goal, nearest where there is no solution (Murray et al., 3.2)."""
+def _subproblem_two(
+    first: Vector, second: Vector, start: Vector, goal: Vector, sign: float
+) -> tuple[float, float, bool]:
+    """Angles with R(first, a) R(second, b) start = goal (Murray et al., 3.2), and whether there is a solution.
+
+    Without one, the angles bring ``start`` as near to ``goal`` as the axes allow.
+    """
     c = _dot(first, second)
     across = _cross(first, second)
     span = _dot(across, across)
     along_second, along_first = _dot(second, start), _dot(goal, first)
     alpha = (along_first - c * along_second) / span
     beta = (along_second - c * along_first) / span
-    gamma = sign * math.sqrt(max((1.0 - alpha * alpha - beta * beta - 2.0 * alpha * beta * c) / span, 0.0))
+    square = (1.0 - alpha * alpha - beta * beta - 2.0 * alpha * beta * c) / span
+    gamma = sign * math.sqrt(max(square, 0.0))
     middle = (
         alpha * first[0] + beta * second[0] + gamma * across[0],
         alpha * first[1] + beta * second[1] + gamma * across[1],
         alpha * first[2] + beta * second[2] + gamma * across[2],
     )
-    return _angle_about(first, middle, goal), _angle_about(second, start, middle)
+    return _angle_about(first, middle, goal), _angle_about(second, start, middle), square >= 0.0
 
 
 def _angle_about(axis: Vector, start: Vector, goal: Vector) -> float:

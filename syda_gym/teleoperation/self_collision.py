@@ -175,10 +175,40 @@ def _arm_model(robot: Robot) -> tuple[Any, Any]:
         if model.existJointName(name) and model.joints[model.getJointId(name)].nq == 1:
             configuration[model.joints[model.getJointId(name)].idx_q] = angle
     locked = [model.getJointId(name) for name in model.names if name not in ("universe", *robot.joint_names)]
+    _join_capsules(shapes)
     for shape in shapes.geometryObjects:
         _convex(shape)
     reduced, kept = pinocchio.buildReducedModel(model, shapes, locked, configuration)
     return reduced, kept
+
+
+def _join_capsules(shapes: Any) -> None:
+    """Makes one capsule of a cylinder and the two spheres at its ends, which is how URDF writes a capsule."""
+    import coal
+
+    # Plain copies first: the list's elements are references into a vector that changes under removal.
+    balls = {
+        shape.name: (shape.parentFrame, float(shape.geometry.radius), np.array(shape.placement.translation))
+        for shape in shapes.geometryObjects
+        if isinstance(shape.geometry, coal.Sphere)
+    }
+    needless: set[str] = set()
+    for shape in shapes.geometryObjects:
+        if not isinstance(shape.geometry, coal.Cylinder):
+            continue
+        radius, half = float(shape.geometry.radius), float(shape.geometry.halfLength)
+        ends = [shape.placement.act(np.array([0.0, 0.0, sign * half])) for sign in (1.0, -1.0)]
+        caps = [
+            name
+            for end in ends
+            for name, (frame, size, centre) in balls.items()
+            if frame == shape.parentFrame and abs(size - radius) < 1e-6 and np.linalg.norm(centre - end) < 1e-6
+        ]
+        if len(caps) >= 2:
+            shape.geometry = coal.Capsule(radius, 2.0 * half)
+            needless.update(caps)
+    for name in needless:
+        shapes.removeGeometryObject(name)
 
 
 def _convex(shape: Any) -> None:
