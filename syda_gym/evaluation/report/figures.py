@@ -148,12 +148,13 @@ class _RobotModel:
         rest = self.place(robot.rest)
         probe = self.place(np.clip(robot.rest + 0.3, robot.lower, robot.upper))
         self.links = [name for name in rest if name in urdf.link_map and not np.allclose(rest[name], probe[name])]
+        colours = {material.name: material.color for material in urdf.robot.materials if material.color is not None}
         shapes = []
         for name, link in urdf.link_map.items():
             if name in rest:
                 carrier = self.links.index(name) if name in self.links else -1
                 frame = np.eye(4) if carrier >= 0 else rest[name]
-                shapes += [_shape(solid, frame, carrier) for solid in _solids(link)]
+                shapes += [_shape(solid, frame, carrier, colours) for solid in _solids(link)]
         still = [shape.position[2] - _half_height(shape) for shape in shapes if shape.pose < 0]
         self.floor = float(min(still, default=min(rest[name][2, 3] for name in rest)))
         self.shapes = tuple(
@@ -225,7 +226,7 @@ def _solids(link: Any) -> list[Any]:
     return []
 
 
-def _shape(solid: Any, frame: FloatArray, carrier: int) -> Shape:
+def _shape(solid: Any, frame: FloatArray, carrier: int, colours: dict[str, Any]) -> Shape:
     from scipy.spatial.transform import Rotation
 
     pose = frame @ (np.eye(4) if solid.origin is None else np.asarray(solid.origin, dtype=np.float64))
@@ -241,17 +242,20 @@ def _shape(solid: Any, frame: FloatArray, carrier: int) -> Shape:
     return Shape(
         kind,
         size,
-        _colour(solid),
+        _colour(solid, colours),
         pose=carrier,
         position=(float(pose[0, 3]), float(pose[1, 3]), float(pose[2, 3])),
         rotation=(float(turn[0]), float(turn[1]), float(turn[2]), float(turn[3])),
     )
 
 
-def _colour(solid: Any) -> Colour:
+def _colour(solid: Any, colours: dict[str, Any]) -> Colour:
+    """The solid's own colour, or that of the material it names."""
     material = getattr(solid, "material", None)
-    rgba = None if material is None or material.color is None else material.color.rgba
-    return _ROBOT_COLOUR if rgba is None else (float(rgba[0]), float(rgba[1]), float(rgba[2]))
+    found = None if material is None else material.color or colours.get(material.name)
+    if found is None:
+        return _ROBOT_COLOUR
+    return (float(found.rgba[0]), float(found.rgba[1]), float(found.rgba[2]))
 
 
 def _half_height(shape: Shape) -> float:
