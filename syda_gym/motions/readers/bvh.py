@@ -61,13 +61,37 @@ def read_bvh(path: str | Path) -> Motions:
     positions = _positions(file, structure)
     matched = match_joints(structure.names)
     joints = {joint: positions[:, structure.names.index(name)] for joint, name in matched.items()}
-    lines = structure.first_line + np.arange(structure.frames)
+    structure_lines = structure.first_line + np.arange(structure.frames)
     notes = ["joints: " + ", ".join(f"{joint} = {matched[joint]}" for joint in matched if joint[1:] in _ARM_PARTS)]
+    start = 0
+    if _begins_with_calibration(joints):
+        start = 1
+        notes.append("the first frame is a calibration pose that the motion does not continue; dropped")
     return motions_from(
         Recording(
-            file, "bvh", joints, fps=1.0 / structure.frame_time, lines=lines, names=tuple(structure.names), notes=notes
+            file,
+            "bvh",
+            {joint: values[start:] for joint, values in joints.items()},
+            fps=1.0 / structure.frame_time,
+            lines=structure_lines[start:],
+            names=tuple(structure.names),
+            notes=notes,
         )
     )
+
+
+def _begins_with_calibration(joints: dict[str, FloatArray]) -> bool:
+    """Whether a hand jumps by half an arm between the first two frames and nowhere near as far later (CMU's T pose)."""
+    for side in "LR":
+        arm = [joints.get(side + part) for part in _ARM_PARTS]
+        if any(values is None or len(values) < 4 for values in arm):
+            continue
+        shoulder, elbow, hand = (values for values in arm if values is not None)
+        length = np.linalg.norm(elbow[1] - shoulder[1]) + np.linalg.norm(hand[1] - elbow[1])
+        jumps = np.linalg.norm(np.diff(hand - shoulder, axis=0), axis=1)
+        if jumps[0] > 0.5 * length and jumps[0] > 3.0 * jumps[1:].max():
+            return True
+    return False
 
 
 _ARM_PARTS = ("Shoulder", "Elbow", "Hand")

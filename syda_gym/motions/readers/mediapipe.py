@@ -6,8 +6,8 @@ https://ai.google.dev/edge/mediapipe/solutions/vision/pose_landmarker
 
 - **JSON**: a list of frames, or an object with the list under ``frames`` (and ``fps``). A frame is a list of 33
   landmarks, or an object with them under ``pose_world_landmarks`` (or ``world_landmarks``, ``landmarks``) and a time
-  under ``timestamp_ms`` or ``timestamp`` [s]. A landmark is ``{"x", "y", "z", "visibility"}`` or ``[x, y, z, visibility]``.
-  An empty list is a frame without a person. One JSON value a line (JSON lines) works as well.
+  under ``timestamp_ms`` or ``timestamp`` [s]. A landmark is ``{"x", "y", "z", "visibility"}`` or
+  ``[x, y, z, visibility]``. An empty list is a frame without a person. JSON lines work as well.
 - **CSV**: a header that names joints and axes, see ``table``.
 - **npz**: ``world_landmarks`` (or ``pose_world_landmarks``, ``landmarks``) of shape ``(N, 33, 3)`` or with visibility
   ``(N, 33, 4)``, and ``timestamps`` [s] ``(N,)`` or ``fps``.
