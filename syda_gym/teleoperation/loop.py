@@ -161,7 +161,7 @@ class TeleoperationLoop:
         try:
             mapped = self._guarded(self.calibration.apply(frame))
         except (SydaError, ArithmeticError, ValueError) as error:  # a robot in motion must survive any mapping
-            reasons.append(f"mapping: {str(error).splitlines()[0][:200]}")
+            reasons.append(f"mapping: {' '.join(str(error).split())[:200] or type(error).__name__}")
             return float("nan"), False
         trust = self._policy.factor(mapped.bound, tick.tracking)
         if trust == 0.0:
