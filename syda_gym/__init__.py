@@ -7,6 +7,8 @@ loaded when it is first used.
     import syda_gym
 
     env = gym.make("SydaTeleop-v0")
+
+``gym.make("syda_gym:SydaTeleop-v0")`` does both in one.
 """
 
 from __future__ import annotations
@@ -21,7 +23,11 @@ from syda_gym.errors import SydaError
 if TYPE_CHECKING:
     from syda_gym import transferability as transferability
     from syda_gym.embodiments.catalog import get as embodiment
-    from syda_gym.embodiments.embodiment import landmark_error
+    from syda_gym.embodiments.embodiment import Embodiment, landmark_error
+    from syda_gym.embodiments.human import HumanSkeleton
+    from syda_gym.embodiments.robot import Robot
+    from syda_gym.envs.teleop import SydaTeleopEnv
+    from syda_gym.envs.vector import SydaTeleopVectorEnv
     from syda_gym.mappings.chain import ChainMapping
     from syda_gym.mappings.fitting import fit
     from syda_gym.mappings.mapping import Mapping
@@ -29,16 +35,22 @@ if TYPE_CHECKING:
     from syda_gym.motions.clip import Motions, PairedMotions
     from syda_gym.motions.loading import load_motions
     from syda_gym.motions.readers.npz import save_motions
-    from syda_gym.transferability.routing import best_route
+    from syda_gym.transferability.routing import best_route, ranked_routes
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "ENV_ID",
     "ChainMapping",
+    "Embodiment",
+    "HumanSkeleton",
     "Mapping",
     "Motions",
     "PairedMotions",
+    "Robot",
     "SydaError",
+    "SydaTeleopEnv",
+    "SydaTeleopVectorEnv",
     "__version__",
     "best_route",
     "embodiment",
@@ -46,29 +58,36 @@ __all__ = [
     "landmark_error",
     "load_mapping",
     "load_motions",
+    "ranked_routes",
     "save_mapping",
     "save_motions",
     "transferability",
 ]
 
+ENV_ID = "SydaTeleop-v0"
+
 # Public name -> the module that holds it and its name there (None: the module itself).
 _LAZY: dict[str, tuple[str, str | None]] = {
     "ChainMapping": ("mappings.chain", "ChainMapping"),
+    "Embodiment": ("embodiments.embodiment", "Embodiment"),
+    "HumanSkeleton": ("embodiments.human", "HumanSkeleton"),
     "Mapping": ("mappings.mapping", "Mapping"),
     "Motions": ("motions.clip", "Motions"),
     "PairedMotions": ("motions.clip", "PairedMotions"),
+    "Robot": ("embodiments.robot", "Robot"),
+    "SydaTeleopEnv": ("envs.teleop", "SydaTeleopEnv"),
+    "SydaTeleopVectorEnv": ("envs.vector", "SydaTeleopVectorEnv"),
     "best_route": ("transferability.routing", "best_route"),
     "embodiment": ("embodiments.catalog", "get"),
     "fit": ("mappings.fitting", "fit"),
     "landmark_error": ("embodiments.embodiment", "landmark_error"),
     "load_mapping": ("mappings.storage", "load_mapping"),
     "load_motions": ("motions.loading", "load_motions"),
+    "ranked_routes": ("transferability.routing", "ranked_routes"),
     "save_mapping": ("mappings.storage", "save_mapping"),
     "save_motions": ("motions.readers.npz", "save_motions"),
-    "transferability": (
-        "transferability",
-        None,
-    ),  # a module that can be called: syda_gym.transferability("adult", "pepper")
+    # A module that can be called: syda_gym.transferability("adult", "pepper").
+    "transferability": ("transferability", None),
 }
 
 
@@ -86,9 +105,9 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 
-if "SydaTeleop-v0" not in gymnasium.registry:  # the package may be reloaded
+if ENV_ID not in gymnasium.registry:  # the package may be reloaded
     gymnasium.register(
-        id="SydaTeleop-v0",
+        id=ENV_ID,
         entry_point="syda_gym.envs.teleop:SydaTeleopEnv",
         vector_entry_point="syda_gym.envs.vector:SydaTeleopVectorEnv",
     )

@@ -1,0 +1,101 @@
+"""SydaTeleopEnv: teleoperation of a humanoid as a Gymnasium environment."""
+
+from __future__ import annotations
+
+from typing import Any, SupportsFloat
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import ArrayLike, NDArray
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.envs.face import Face
+from syda_gym.envs.fleet import Fleet
+from syda_gym.envs.options import TeleopOptions
+from syda_gym.envs.spaces import action_from_command, action_space, one_info, wishes
+from syda_gym.errors import OptionError, SydaError
+
+__all__ = ["SydaTeleopEnv"]
+
+Observation = NDArray[np.float32]
+Action = NDArray[np.float32]
+
+
+class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
+    """Replays an operator's motion on a robot; an agent corrects what the mapping asks for."""
+
+    metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": 30}  # noqa: RUF012
+
+    def __init__(
+        self,
+        render_mode: str | None = None,
+        *,
+        options: TeleopOptions | None = None,
+        **changes: Any,
+    ) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise OptionError(
+                f"render_mode={render_mode!r} is not allowed; choose one of {self.metadata['render_modes']}"
+            )
+        self.options = TeleopOptions.of(options, changes)
+        self.render_mode = render_mode
+        self._fleet = Fleet(self.options, 1)
+        self.metadata = {**type(self).metadata, "render_fps": round(self._fleet.rates.control_hz)}
+        self.observation_space = Box(self.layout.low, self.layout.high, dtype=np.float32)
+        self.action_space = action_space(self.robot, self.options)
+        self._started = False
+
+    def action_from_command(self, command: ArrayLike) -> FloatArray:
+        """The action whose command comes nearest to ``command``, in either action mode.
+
+        Args:
+            command: joint angles ``(n,)`` [rad].
+
+        Returns:
+            ``(n,)``, within the action space.
+        """
+        return action_from_command(self.options, self.robot, np.asarray(command, dtype=np.float64), self._fleet.base[0])
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begins an episode.
+
+        Args:
+            seed: new seed of the environment's random numbers; ``None`` goes on with them.
+            options: ``motion`` (name or index of a clip), ``frame`` (first frame), ``route`` (names of bodies).
+
+        Raises:
+            OptionError: unknown options or values.
+            RouteError: the route cannot be taken.
+        """
+        super().reset(seed=seed)
+        wish = wishes(self._fleet.repertoire, options, 1)
+        self._fleet.reset([0], [self.np_random], wish)
+        self._started = True
+        return self._fleet.observe()[0], self._info()
+
+    def step(self, action: Action) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
+        """One control step.
+
+        Args:
+            action: ``(n,)`` corrections in [-1, 1] or joint angles [rad].
+
+        Raises:
+            OptionError: wrong shape or values that are not finite.
+            SydaError: not reset yet.
+        """
+        if not self._started:
+            raise SydaError("step was called before reset; call reset first")
+        fleet = self._fleet
+        fleet.step(np.asarray(action)[None])
+        observation = fleet.observe()[0]
+        return observation, float(fleet.reward[0]), bool(fleet.terminated[0]), bool(fleet.truncated[0]), self._info()
+
+    def close(self) -> None:
+        """Releases the physics; harmless when repeated."""
+        self._fleet.close()
+
+    def _info(self) -> dict[str, Any]:
+        return one_info(self._fleet.info(), self._fleet.names(0), 0)

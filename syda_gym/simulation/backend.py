@@ -1,0 +1,99 @@
+"""Backend: what the environment may ask of a world, whichever physics is behind it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.robot import Robot
+from syda_gym.errors import OptionError, nearest_name
+from syda_gym.simulation.rates import Rates
+
+__all__ = ["BACKENDS", "Backend", "MotorConditions", "make_world"]
+
+BACKENDS = ("bullet", "servo")
+"""PyBullet, or the motor law in numpy."""
+
+
+@dataclass(frozen=True)
+class MotorConditions:
+    """How a robot differs from the nominal one.
+
+    Attributes:
+        gain: factor on the motors' position gain.
+        speed: factor on the top speed of the joints.
+        payload: mass held in each hand [kg].
+        friction: share of each motor's effort that friction eats up.
+    """
+
+    gain: float = 1.0
+    speed: float = 1.0
+    payload: float = 0.0
+    friction: float = 0.0
+
+
+NOMINAL = MotorConditions()
+
+
+class Backend(Protocol):
+    """``count`` robots of one kind that take joint commands.
+
+    Attributes:
+        robot: the kind.
+        rates: control and physics rate.
+        count: number of robots, called B.
+        pose: ``(B, n + 6 * arms)``: joint angles [rad], then the landmarks' coordinates [m] in the torso frame.
+        qd: ``(B, n)`` joint speeds [rad/s].
+        contacts: ``(B,)`` pairs of links of a robot that touch each other; 0 without self-collision.
+    """
+
+    robot: Robot
+    rates: Rates
+    count: int
+    pose: FloatArray
+    qd: FloatArray
+    contacts: NDArray[np.int64]
+
+    def reset(self, which: NDArray[np.intp], q: FloatArray) -> None:
+        """Puts robots ``which`` ``(k,)`` at rest at joint angles ``q`` ``(k, n)`` [rad]."""
+
+    def set_conditions(self, index: int, conditions: MotorConditions) -> None:
+        """Changes motors and payload of one robot until they are changed again."""
+
+    def advance(self, commands: FloatArray) -> None:
+        """Lets every robot follow its command ``(B, n)`` [rad] for one control step; new state arrays result."""
+
+    def close(self) -> None:
+        """Releases what the world holds; harmless when repeated."""
+
+
+def make_world(
+    robot: Robot, rates: Rates, *, count: int = 1, physics: str = "bullet", self_collision: bool = False
+) -> Backend:
+    """Builds a world.
+
+    Args:
+        robot: the kind of robot.
+        rates: control and physics rate.
+        count: number of robots.
+        physics: one of ``BACKENDS``.
+        self_collision: whether a robot's links collide with each other (``bullet`` only).
+
+    Raises:
+        OptionError: unknown physics, or self-collision asked of a physics without contacts.
+    """
+    if physics not in BACKENDS:
+        raise OptionError(f"unknown physics {physics!r}; {nearest_name(str(physics), BACKENDS)}")
+    if physics == "servo":
+        if self_collision:
+            raise OptionError("physics='servo' knows no contacts; use physics='bullet' or self_collision=False")
+        from syda_gym.simulation.servo import ServoWorld
+
+        return ServoWorld(robot, rates, count)
+    from syda_gym.simulation.world import World
+
+    return World(robot, rates, count, self_collision=self_collision)

@@ -1,0 +1,302 @@
+"""World: robots in PyBullet clients, commanded joint by joint and read back without waste."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.robot import Robot
+from syda_gym.errors import EmbodimentError, OptionError
+from syda_gym.simulation.backend import NOMINAL, MotorConditions
+from syda_gym.simulation.rates import Rates
+
+__all__ = ["ROBOTS_PER_CLIENT", "World"]
+
+ROBOTS_PER_CLIENT = 16
+"""More robots in one client slow its solver down (by a third at 32)."""
+
+_HOLD_FORCE = 1e5  # N m; legs and head are no subject of the simulation and stand like a rock
+_GRAVITY = (0.0, 0.0, -9.81)
+
+
+class World:
+    """``count`` robots of one kind in PyBullet, all with their torso at the origin, upright.
+
+    Robots overlap in space but never touch each other: collisions are filtered out, or, with self-collision, each robot
+    has a client of its own. That makes a robot's motion independent of how many others there are, bit for bit.
+    Position motors follow ``kp = rates.motor_gain`` with the URDF's efforts and joint speeds as limits. Joints that are
+    not arm joints are held at the robot's rest pose.
+
+    Args:
+        robot: the kind of robot.
+        rates: control and physics rate.
+        count: number of robots.
+        self_collision: whether a robot's links collide with each other, except the pairs that its description disables.
+
+    Raises:
+        OptionError: ``count`` is not positive.
+        EmbodimentError: PyBullet cannot load the URDF or lacks one of its joints.
+    """
+
+    def __init__(self, robot: Robot, rates: Rates, count: int = 1, *, self_collision: bool = False) -> None:
+        if count < 1:
+            raise OptionError(f"a world needs at least one robot, got {count}")
+        self.robot = robot
+        self.rates = rates
+        self.count = count
+        self.self_collision = self_collision
+        import pybullet
+
+        self._bullet = pybullet  # kept, because nothing can be imported while the interpreter shuts down
+        self._clients: list[int] = []
+        self._puppets: list[_Puppet] = []
+        per_client = 1 if self_collision else ROBOTS_PER_CLIENT
+        try:
+            for first in range(0, count, per_client):
+                client = _connect(rates)
+                self._clients.append(client)
+                for _ in range(min(per_client, count - first)):
+                    self._puppets.append(_Puppet(robot, rates, client, self_collision))
+        except BaseException:
+            self.close()
+            raise
+        self.pose = np.zeros((count, 0))
+        self.qd = np.zeros((count, 0))
+        self.contacts = np.zeros(count, dtype=np.int64)
+        self._settle(robot.rest.tolist())
+        self.reset(np.arange(count), np.repeat(robot.rest[None], count, axis=0))
+
+    def reset(self, which: NDArray[np.intp], q: FloatArray) -> None:
+        """Puts robots ``which`` ``(k,)`` at rest at joint angles ``q`` ``(k, n)`` [rad]; nothing is reloaded."""
+        n = len(self.robot.joint_names)
+        if len(which) == self.count:
+            self.pose, self.qd = np.empty((self.count, n + self._puppets[0].n_points)), np.zeros((self.count, n))
+            self.contacts = np.zeros(self.count, dtype=np.int64)
+        else:  # the old arrays may have been handed out
+            self.pose, self.qd, self.contacts = self.pose.copy(), self.qd.copy(), self.contacts.copy()
+        for index, angles in zip(which.tolist(), q.tolist(), strict=True):
+            puppet = self._puppets[index]
+            puppet.reset(angles)
+            row = puppet.read()
+            self.pose[index], self.qd[index] = row[:-n], row[-n:]
+            self.contacts[index] = puppet.contacts() if self.self_collision else 0
+
+    def _settle(self, rest: list[float]) -> None:
+        """One step, after which every reset leads to the same bits; the first one ever would not."""
+        for puppet in self._puppets:
+            puppet.reset(rest)
+        for client in self._clients:
+            self._bullet.stepSimulation(client)
+        if self.self_collision:
+            for puppet in self._puppets:
+                puppet.reset(rest)
+                puppet.remember()
+
+    def set_conditions(self, index: int, conditions: MotorConditions) -> None:
+        """Changes motors and payload of one robot until they are changed again."""
+        self._puppets[index].set_conditions(conditions)
+
+    def advance(self, commands: FloatArray) -> None:
+        """Lets every robot follow its command ``(B, n)`` [rad] for one control step."""
+        for puppet, command in zip(self._puppets, commands.tolist(), strict=True):
+            puppet.command(command)
+        step, substeps = self._bullet.stepSimulation, range(self.rates.substeps)
+        for client in self._clients:
+            for _ in substeps:
+                step(client)
+        state = np.array([puppet.read() for puppet in self._puppets])
+        split = state.shape[1] - len(self.robot.joint_names)
+        self.pose, self.qd = state[:, :split], state[:, split:]
+        if self.self_collision:
+            self.contacts = np.array([puppet.contacts() for puppet in self._puppets], dtype=np.int64)
+
+    def close(self) -> None:
+        """Disconnects; an unclosed client costs 28 MB."""
+        clients, self._clients, self._puppets = self._clients, [], []
+        for client in clients:
+            if self._bullet.isConnected(client):
+                self._bullet.disconnect(client)
+
+    def __del__(self) -> None:
+        if getattr(self, "_clients", None):
+            self.close()
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A live client id means nothing in another process.
+        raise TypeError("a World holds live PyBullet clients and cannot be pickled; pickle the environment instead")
+
+
+class _Puppet:
+    """One robot in one client."""
+
+    def __init__(self, robot: Robot, rates: Rates, client: int, self_collision: bool) -> None:
+        import pybullet
+
+        self._bullet = pybullet
+        self._client = client
+        flags = pybullet.URDF_USE_SELF_COLLISION if self_collision else 0
+        try:
+            body = pybullet.loadURDF(str(robot.urdf), useFixedBase=True, flags=flags, physicsClientId=client)
+        except pybullet.error as error:
+            raise EmbodimentError(f"PyBullet cannot load {robot.urdf}: {error}; check the file") from error
+        self._body: int = body
+        rows = [
+            pybullet.getJointInfo(body, joint, physicsClientId=client)
+            for joint in range(pybullet.getNumJoints(body, physicsClientId=client))
+        ]
+        joints = {row[1].decode(): row[0] for row in rows}
+        links = {row[12].decode(): row[0] for row in rows}
+        links[pybullet.getBodyInfo(body, physicsClientId=client)[0].decode()] = -1
+        self._arms = _ids(joints, robot.joint_names, robot, "joint")
+        self._movable = [row[0] for row in rows if row[2] in (pybullet.JOINT_REVOLUTE, pybullet.JOINT_PRISMATIC)]
+        names = {row[0]: row[1].decode() for row in rows}
+        self._rest = [float(robot.description.rest.get(names[joint], 0.0)) for joint in self._movable]
+        self._arm_places = [self._movable.index(joint) for joint in self._arms]
+        self._still = [[0.0]] * len(self._movable)
+        points = [link for arm in _arms_in_order(robot) for link in (arm.elbow, arm.wrist)]
+        self._points = _ids(links, points, robot, "link")
+        self.n_points = 3 * len(self._points)
+        self._hands = _ids(links, [arm.wrist for arm in _arms_in_order(robot)], robot, "link")
+        self._hand_masses = [pybullet.getDynamicsInfo(body, link, physicsClientId=client)[0] for link in self._hands]
+        # A motor without a stated limit gets one that no arm will ever reach.
+        self._effort = np.where(np.isfinite(robot.effort), robot.effort, _HOLD_FORCE)
+        self._speed = np.where(np.isfinite(robot.speed), robot.speed, 1e3)
+        self._gain = rates.motor_gain
+        self._held = [joint for joint in self._movable if joint not in self._arms]
+        self._conditions = NOMINAL
+        self._stand_up(links[robot.description.torso])
+        self._filter(robot, links, self_collision)
+        self._hold()
+        self._apply(NOMINAL)
+        self._pristine: int | None = None
+
+    def remember(self) -> None:
+        """Keeps the present state of the client to return to at every reset."""
+        self._pristine = self._bullet.saveState(physicsClientId=self._client)
+
+    def reset(self, angles: Sequence[float]) -> None:
+        """At rest at the given arm angles; every joint is set, since a partial reset leaves traces in the bits."""
+        if self._pristine is not None:  # contacts remember the past
+            self._bullet.restoreState(self._pristine, physicsClientId=self._client)
+        q = [[angle] for angle in self._rest]
+        for place, angle in zip(self._arm_places, angles, strict=True):
+            q[place] = [angle]
+        self._bullet.resetJointStatesMultiDof(self._body, self._movable, q, self._still, physicsClientId=self._client)
+
+    def command(self, targets: list[float]) -> None:
+        """Position targets of the arm joints [rad]."""
+        self._bullet.setJointMotorControlArray(
+            self._body,
+            self._arms,
+            self._bullet.POSITION_CONTROL,
+            targetPositions=targets,
+            forces=self._forces,
+            positionGains=self._gains,
+            physicsClientId=self._client,
+        )
+
+    def read(self) -> list[float]:
+        """Arm angles, coordinates of the landmarks, arm speeds; in one list."""
+        states = self._bullet.getJointStates(self._body, self._arms, self._client)
+        row = [state[0] for state in states]
+        # Without forward kinematics PyBullet returns the link poses of the step before.
+        for link in self._bullet.getLinkStates(self._body, self._points, 0, 1, self._client):
+            row += link[4]
+        row += [state[1] for state in states]
+        return row
+
+    def contacts(self) -> int:
+        """Number of pairs of links that touch."""
+        points = self._bullet.getContactPoints(self._body, self._body, physicsClientId=self._client)
+        return len({(point[3], point[4]) for point in points if point[8] <= 0.0})
+
+    def set_conditions(self, conditions: MotorConditions) -> None:
+        """Changes motors and payload if they differ from the present ones."""
+        if conditions != self._conditions:
+            self._apply(conditions)
+
+    def _apply(self, conditions: MotorConditions) -> None:
+        self._conditions = conditions
+        self._forces = (self._effort * (1.0 - conditions.friction)).tolist()
+        self._gains = [self._gain * conditions.gain] * len(self._arms)
+        # setJointMotorControlArray has no speed limit, but keeps the one set here.
+        for joint, force, speed in zip(self._arms, self._forces, self._speed * conditions.speed, strict=True):
+            self._bullet.setJointMotorControl2(
+                self._body,
+                joint,
+                self._bullet.POSITION_CONTROL,
+                targetPosition=0.0,
+                positionGain=self._gains[0],
+                force=force,
+                maxVelocity=float(speed),
+                physicsClientId=self._client,
+            )
+        for link, mass in zip(self._hands, self._hand_masses, strict=True):
+            self._bullet.changeDynamics(self._body, link, mass=mass + conditions.payload, physicsClientId=self._client)
+
+    def _stand_up(self, torso: int) -> None:
+        """Moves the base so that the torso frame is the world frame when the legs are at rest."""
+        bullet, client = self._bullet, self._client
+        for joint, angle in zip(self._movable, self._rest, strict=True):
+            bullet.resetJointState(self._body, joint, angle, physicsClientId=client)
+        base = bullet.getBasePositionAndOrientation(self._body, physicsClientId=client)
+        place = base
+        if torso >= 0:
+            state = bullet.getLinkState(self._body, torso, computeForwardKinematics=1, physicsClientId=client)
+            place = (state[4], state[5])
+        inverse = bullet.invertTransform(*place)
+        self._turn = inverse[1]
+        bullet.resetBasePositionAndOrientation(
+            self._body, *bullet.multiplyTransforms(*inverse, *base), physicsClientId=client
+        )
+        down = bullet.rotateVector(self._turn, _GRAVITY)
+        bullet.setGravity(*down, physicsClientId=client)
+
+    def _filter(self, robot: Robot, links: dict[str, int], self_collision: bool) -> None:
+        if self_collision:
+            for first, second in robot.description.disabled_collisions:
+                pair = _ids(links, (first, second), robot, "link")
+                self._bullet.setCollisionFilterPair(
+                    self._body, self._body, pair[0], pair[1], 0, physicsClientId=self._client
+                )
+            return
+        for link in links.values():
+            self._bullet.setCollisionFilterGroupMask(self._body, link, 0, 0, physicsClientId=self._client)
+
+    def _hold(self) -> None:
+        angles = dict(zip(self._movable, self._rest, strict=True))
+        for joint in self._held:
+            self._bullet.setJointMotorControl2(
+                self._body,
+                joint,
+                self._bullet.POSITION_CONTROL,
+                targetPosition=angles[joint],
+                positionGain=1.0,
+                force=_HOLD_FORCE,
+                physicsClientId=self._client,
+            )
+
+
+def _connect(rates: Rates) -> int:
+    import pybullet
+
+    client: int = pybullet.connect(pybullet.DIRECT)
+    pybullet.setTimeStep(rates.physics_dt, physicsClientId=client)
+    pybullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=client)
+    return client
+
+
+def _ids(known: dict[str, int], names: Sequence[str], robot: Robot, what: str) -> list[int]:
+    missing = [name for name in names if name not in known]
+    if missing:
+        raise EmbodimentError(f"{robot.urdf.name}: PyBullet knows no {what} {missing[0]!r}; it has {', '.join(known)}")
+    return [known[name] for name in names]
+
+
+def _arms_in_order(robot: Robot) -> list[Any]:
+    by_side = {arm.side: arm for arm in robot.description.arms}
+    return [by_side[side] for side in robot.sides]
