@@ -203,11 +203,7 @@ def _paint(
 ) -> None:
     """Draws one solid; rotation and centre are in camera axes."""
     height, width = depth.shape
-    half = {
-        "sphere": lambda: np.full(3, size[0]),
-        "cylinder": lambda: np.array([size[0], size[0], size[1] / 2]),
-        "box": lambda: np.array(size) / 2,
-    }[shape.kind]()
+    half = _half_sides(shape.kind, size)
     reach = np.abs(rotation) @ half if shape.kind != "sphere" else half
     x0, y0 = _pixel(centre, width, height, scale)
     left, right = max(0, int(x0 - scale * reach[0])), min(width, int(x0 + scale * reach[0]) + 2)
@@ -229,6 +225,13 @@ def _paint(
     lit = np.array(shape.colour) * light[:, :, None] + glint[:, :, None]
     colour[top:bottom, left:right][nearer] = lit[nearer]
     depth[top:bottom, left:right][nearer] = (z + centre[2])[nearer]
+
+
+def _half_sides(kind: str, size: tuple[float, ...]) -> FloatArray:
+    """Half sides of the box around a solid, in its own axes."""
+    if kind == "sphere":
+        return np.full(3, size[0])
+    return np.array([size[0], size[0], size[1] / 2]) if kind == "cylinder" else np.array(size) / 2
 
 
 def _hit_sphere(

@@ -161,7 +161,7 @@ def play(env: SydaTeleopEnv, agent: Agent, motion: int | str, seed: int | None =
     observation, info = env.reset(seed=seed, options={"motion": motion})
     agent.reset(1, seed)
     shown = env.layout["operator"]
-    seen: list[FloatArray] = []
+    seen: list[NDArray[np.float32]] = []
     base: list[FloatArray] = []
     steps: list[dict[str, Any]] = []
     rewards: list[float] = []
