@@ -7,6 +7,7 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.envs.fleet import Fleet
 from syda_gym.envs.observation import ObservationLayout
 from syda_gym.envs.options import TeleopOptions
+from syda_gym.simulation.rates import Rates
 
 __all__ = ["Face"]
 
@@ -35,6 +36,11 @@ class Face:
     def robot(self) -> Robot:
         """Who follows."""
         return self._fleet.robot
+
+    @property
+    def rates(self) -> Rates:
+        """Control and physics rate, motor gain and lag."""
+        return self._fleet.rates
 
     @property
     def control_hz(self) -> float:
