@@ -77,16 +77,14 @@ class Interface:
         """
         inner = getattr(env, "unwrapped", env)
         try:
-            layout, robot, dt = inner.layout, inner.robot, float(inner.dt)
-            gain, substeps = float(inner.motor_gain), int(inner.substeps)
+            layout, robot, rates = inner.layout, inner.robot, inner.rates
+            slices = {str(name): layout[name] for name in layout}
+            return cls(robot, slices, int(layout.size), float(rates.dt), float(rates.lag_share))
         except AttributeError as error:
             raise AgentError(
                 f"{type(inner).__name__} is not an environment that agents can act in ({error}); "
                 "make one with gymnasium.make('SydaTeleop-v0') or gymnasium.make_vec"
             ) from error
-        slices = {str(name): layout[name] for name in layout}
-        size = max(part.stop for part in slices.values())
-        return cls(robot, slices, int(size), dt, lag_share(gain, substeps))
 
     @property
     def n(self) -> int:

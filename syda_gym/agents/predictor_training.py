@@ -146,6 +146,7 @@ class _Trainer:
         self._schedule = torch.optim.lr_scheduler.CosineAnnealingLR(self._optimiser, config.iterations)
         self._below = commands_below(base, self.streams)
         self._kinematics = TorchLandmarks(self.interface)
+        self._start = torch.as_tensor(self.streams.base[:, 0], dtype=torch.float32)
         self._reference = torch.as_tensor(self.streams.reference, dtype=torch.float32)
         with torch.no_grad():
             self._targets = torch.stack([self._kinematics(reference) for reference in self._reference])
@@ -168,7 +169,7 @@ class _Trainer:
         """Takes the joint angles that the current network led to as what the network sees next."""
         import torch
 
-        before = np.concatenate([self.streams.reference[:, :1], q_after[:, :-1]], axis=1)
+        before = np.concatenate([self.streams.base[:, :1], q_after[:, :-1]], axis=1)
         last = np.concatenate([self._below[:, :1], self._below[:, :-1]], axis=1)
         inputs = network_inputs(self.interface, self._below, last, before, self.streams.age)
         self._inputs = torch.as_tensor(inputs, dtype=torch.float32)
@@ -194,7 +195,7 @@ class _Trainer:
         bound = self.config.bound
         correction = tcn(self._parameters, self._inputs[rows])
         commands = self._commands[rows] + bound * torch.tanh(correction / bound)
-        q = _servo(commands, self._reference[rows, 0], self._share[rows])
+        q = _servo(commands, self._start[rows], self._share[rows])
         mask = self._mask[rows]
         points, targets = self._kinematics(q), self._targets[rows]
         landmark = 1e3 * _masked(_length(points - targets).mean(-1), mask)

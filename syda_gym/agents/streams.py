@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ class Streams:
         lengths: control steps of each episode ``(E,)``.
         motors: how each robot differs from the nominal one; nominal if empty.
         names: of each episode, for tables.
+        operator: newest operator frame at hand ``(E, T, F)``; only needed where an agent reads whole observations.
     """
 
     base: FloatArray
@@ -43,6 +45,7 @@ class Streams:
     lengths: NDArray[np.int64]
     motors: tuple[MotorConditions, ...] = ()
     names: tuple[str, ...] = field(default=())
+    operator: FloatArray | None = None
 
     def __post_init__(self) -> None:
         episodes, steps = self.base.shape[:2]
@@ -69,6 +72,7 @@ class Streams:
             self.lengths[index],
             tuple(self.motors[i] for i in index) if self.motors else (),
             tuple(self.names[i] for i in index) if self.names else (),
+            None if self.operator is None else self.operator[index],
         )
 
     @property
@@ -81,7 +85,8 @@ def join(parts: Sequence[Streams]) -> Streams:
     """All episodes of several streams, padded to the longest by repeating the last step."""
     steps = max(part.base.shape[1] for part in parts)
 
-    def padded(array: FloatArray) -> FloatArray:
+    def padded(array: FloatArray | None) -> FloatArray:
+        assert array is not None
         return np.concatenate([array, np.repeat(array[:, -1:], steps - array.shape[1], axis=1)], axis=1)
 
     with_motors = any(part.motors for part in parts)
@@ -92,6 +97,7 @@ def join(parts: Sequence[Streams]) -> Streams:
         np.concatenate([part.lengths for part in parts]),
         tuple(m for p in parts for m in (p.motors or (MotorConditions(),) * len(p))) if with_motors else (),
         tuple(name for part in parts for name in (part.names or ("",) * len(part))),
+        None if any(p.operator is None for p in parts) else np.concatenate([padded(p.operator) for p in parts]),
     )
 
 
@@ -104,7 +110,7 @@ def play_streams(agent: Agent, streams: Streams, rates: Rates) -> FloatArray:
         rates: control and physics rate; must be those of the agent's interface.
 
     Returns:
-        Joint angles after each step ``(E, T, n)`` [rad].
+        Joint angles after each step ``(E, T, n)`` [rad]. Robots begin at rest at their first base command.
 
     Raises:
         AgentError: the rates are not those that the agent is made for.
@@ -116,7 +122,7 @@ def play_streams(agent: Agent, streams: Streams, rates: Rates) -> FloatArray:
     world = make_world(interface.robot, rates, count=episodes, physics="servo")
     for index, motors in enumerate(streams.motors):
         world.set_conditions(index, motors)
-    world.reset(np.arange(episodes, dtype=np.intp), streams.reference[:, 0])
+    world.reset(np.arange(episodes, dtype=np.intp), streams.base[:, 0])
     agent.reset(episodes)
     result = np.empty_like(streams.base)
     n = interface.n
@@ -129,9 +135,32 @@ def play_streams(agent: Agent, streams: Streams, rates: Rates) -> FloatArray:
 
 
 def read_stream(interface: Interface, streams: Streams, t: int, q: FloatArray, qd: FloatArray) -> Reading:
-    """The reading of step ``t`` of every episode; parts of the observation that no classical agent reads are zero."""
-    base, age = streams.base[:, t], streams.age[:, t]
-    observation = np.zeros((len(streams), interface.size))
+    """The reading of step ``t`` of every episode, with the observation that the environment would show.
+
+    Blocks that a stream does not hold (a preview, histories, the previous action) are zero.
+    """
+    rows = np.arange(len(streams))
+    return read_rows(interface, streams, rows, np.full(len(rows), t), q, qd)
+
+
+def read_rows(
+    interface: Interface,
+    streams: Streams,
+    episodes: NDArray[np.integer[Any]],
+    steps: NDArray[np.integer[Any]],
+    q: FloatArray,
+    qd: FloatArray,
+) -> Reading:
+    """The reading of step ``steps[i]`` of episode ``episodes[i]`` for robots ``i`` at ``q`` ``(B, n)``."""
+    base, age = streams.base[episodes, steps], streams.age[episodes, steps]
+    layout = interface.layout
+    observation = np.zeros((len(q), interface.size))
+    error = layout["base_error"].start
+    observation[:, error : error + interface.n] = base - q
+    observation[:, layout["q"]], observation[:, layout["qd"]] = q, qd
+    observation[:, layout["packet_age"].start] = age
+    if streams.operator is not None and "operator" in layout:
+        observation[:, layout["operator"]] = streams.operator[episodes, steps]
     return Reading(base=base, preview=base[:, None], q=q, qd=qd, age=age, observation=observation)
 
 
