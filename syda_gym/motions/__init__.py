@@ -1,19 +1,42 @@
 """WHAT is moved: clips, takes of several bodies, and frames of two bodies paired."""
 
+from syda_gym.motions.alignment import ActionQuality, Alignment, align, pair_quality, pair_recordings
 from syda_gym.motions.clip import PROTOCOLS, MotionClip, Motions, PairedClip, PairedMotions, Take
-from syda_gym.motions.loading import load_motions, resampled
+from syda_gym.motions.conform import conformed
+from syda_gym.motions.dataset import read_dataset, write_dataset
+from syda_gym.motions.info import MotionsInfo, describe
+from syda_gym.motions.loading import FORMATS, load_motions
+from syda_gym.motions.picture import draw_clips
 from syda_gym.motions.readers.npz import save_motions
+from syda_gym.motions.readers.skeleton import MotionWarning
+from syda_gym.motions.resampling import resampled
 from syda_gym.motions.synthetic import generate
+from syda_gym.motions.validation import Finding, validate_dataset
 
 __all__ = [
+    "FORMATS",
     "PROTOCOLS",
+    "ActionQuality",
+    "Alignment",
+    "Finding",
     "MotionClip",
+    "MotionWarning",
     "Motions",
+    "MotionsInfo",
     "PairedClip",
     "PairedMotions",
     "Take",
+    "align",
+    "conformed",
+    "describe",
+    "draw_clips",
     "generate",
     "load_motions",
+    "pair_quality",
+    "pair_recordings",
+    "read_dataset",
     "resampled",
     "save_motions",
+    "validate_dataset",
+    "write_dataset",
 ]

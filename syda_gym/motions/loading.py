@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -13,7 +13,8 @@ import numpy as np
 
 from syda_gym.errors import MotionError, OptionError, nearest_name
 from syda_gym.files import asset
-from syda_gym.motions.clip import Motions, Take
+from syda_gym.motions.clip import Motions
+from syda_gym.motions.dataset import is_dataset, read_dataset
 from syda_gym.motions.readers.bvh import is_bvh, read_bvh
 from syda_gym.motions.readers.kinect import is_kinect, read_kinect
 from syda_gym.motions.readers.mediapipe import is_mediapipe, read_mediapipe
@@ -21,6 +22,7 @@ from syda_gym.motions.readers.npz import read_npz
 from syda_gym.motions.readers.openni import is_openni, read_openni
 from syda_gym.motions.readers.paper import read_paper
 from syda_gym.motions.readers.text import first_bytes
+from syda_gym.motions.resampling import resampled
 
 __all__ = ["FORMATS", "Format", "load_motions", "resampled"]
 
@@ -74,45 +76,6 @@ def load_motions(spec: str | os.PathLike[str] | Motions = "embedded", fps: float
     return motions if fps is None else resampled(motions, fps)
 
 
-def resampled(motions: Motions, fps: float) -> Motions:
-    """The same motions at another frame rate, by linear interpolation in time (recorded timestamps are honoured).
-
-    Args:
-        motions: what to resample.
-        fps: new frames per second.
-
-    Returns:
-        New motions; a value counts as filled if either of its neighbours was. Takes that already have the rate and no
-        timestamps stay as they are.
-    """
-    return replace(motions, takes=tuple(_resampled(take, fps) for take in motions.takes))
-
-
-def _resampled(take: Take, fps: float) -> Take:
-    if take.timestamps is None and take.fps == fps:
-        return take
-    count = len(next(iter(take.frames.values())))
-    times = np.arange(count) / take.fps if take.timestamps is None else take.timestamps - take.timestamps[0]
-    # A small tolerance keeps the last frame when its time is a multiple of the new period up to rounding.
-    wanted = np.arange(int(np.floor(times[-1] * fps + 1e-6)) + 1) / fps
-    after = np.clip(np.searchsorted(times, wanted - 1e-9), 1, max(1, count - 1))
-    if count == 1:
-        return replace(take, fps=fps, timestamps=None)
-    before = after - 1
-    share = np.clip((wanted - times[before]) / (times[after] - times[before]), 0.0, 1.0)[:, None]
-    share = np.where(share < 1e-6, 0.0, np.where(share > 1.0 - 1e-6, 1.0, share))
-    return replace(
-        take,
-        fps=fps,
-        frames={name: (1.0 - share) * f[before] + share * f[after] for name, f in take.frames.items()},
-        filled={
-            name: (marks[before] & (share < 1.0)) | (marks[after] & (share > 0.0))
-            for name, marks in take.filled.items()
-        },
-        timestamps=None,
-    )
-
-
 @lru_cache(maxsize=1)
 def _embedded() -> Motions:
     return read_npz(asset("motions", "embedded.npz"))
@@ -155,6 +118,7 @@ FORMATS: dict[str, Format] = {
     entry.name: entry
     for entry in (
         Format("paper", "the folder of the paper's workbooks", (), read_paper, _is_paper),
+        Format("pairs", "a folder of paired takes, see write_dataset", (), read_dataset, is_dataset),
         Format("npz", "a file written by save_motions", (".npz",), read_npz, _is_npz),
         Format("bvh", "motion capture, joints found by name", (".bvh",), read_bvh, is_bvh),
         Format("kinect", "Kinect v2: timestamp and 25 joints a line", (".csv",), read_kinect, is_kinect),

@@ -43,7 +43,7 @@ def _replaced(lines: list[str], index: int, line: str) -> list[str]:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (BVH[: BVH.index("MOTION") - 60].rsplit("\n", 1)[0], r"line \d+: the file ends inside the hierarchy; it is truncated"),
+        (BVH[: BVH.index("MOTION") - 60].rsplit("\n", 1)[0], r"line \d+: the file ends inside the hierarchy"),
         (BVH[: BVH.index("Frames")], "expected 'Frames: <count>'; is the file truncated"),
         (BVH[: BVH.index("Frame Time")], "expected 'Frame Time: <seconds>'; is the file truncated"),
         ("\n".join(BVH.splitlines()[:-3]), r"line \d+: 9 frames, but the header says 12; the file is truncated"),

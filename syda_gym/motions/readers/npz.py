@@ -24,7 +24,7 @@ from syda_gym.errors import EmbodimentError, MotionError
 from syda_gym.files import atomic_path
 from syda_gym.motions.clip import Motions, Take
 
-__all__ = ["FORMAT", "MAX_BYTES", "read_npz", "save_motions"]
+__all__ = ["FORMAT", "MAX_BYTES", "body_from_spec", "body_spec", "read_npz", "save_motions"]
 
 FORMAT = "syda-gym motions 1"
 MAX_BYTES = 1 << 30
@@ -59,7 +59,7 @@ def save_motions(motions: Motions, path: str | os.PathLike[str], *, steps: Mappi
         if any(name in take.filled for take in takes):
             marks = [take.filled.get(name, np.zeros(take.frames[name].shape, dtype=bool)) for take in takes]
             arrays[f"filled_{index}"] = np.packbits(np.concatenate(marks))
-        bodies.append({"name": name, "spec": _body_spec(body), "step": step})
+        bodies.append({"name": name, "spec": body_spec(body), "step": step})
     stamped = [take.timestamps for take in motions.takes if take.timestamps is not None]
     if stamped:
         arrays["timestamps"] = np.concatenate(stamped)
@@ -106,7 +106,7 @@ def read_npz(path: str | os.PathLike[str]) -> Motions:
             raise MotionError(
                 f"{file}: format {meta['format']!r}, expected {FORMAT!r}; write it again with this version"
             )
-        bodies = {str(entry["name"]): _body(file, entry["spec"]) for entry in meta["bodies"]}
+        bodies = {str(entry["name"]): body_from_spec(file, entry["spec"]) for entry in meta["bodies"]}
         frames = [
             _decode(file, arrays.get(f"frames_{index}"), body, entry["step"])
             for index, (body, entry) in enumerate(zip(bodies.values(), meta["bodies"], strict=True))
@@ -218,20 +218,28 @@ def _unpack(file: Path, stored: NDArray[Any] | None, frames: FloatArray) -> NDAr
     return np.unpackbits(stored, count=frames.size).astype(bool).reshape(frames.shape)
 
 
-def _body_spec(body: Embodiment) -> dict[str, Any]:
+def body_spec(body: Embodiment) -> dict[str, Any]:
     """Humans completely; of robots name and joints, for motions stay valid when a URDF is refined."""
     spec = body.spec()
     return spec if body.kind == "human" else {"kind": "robot", "name": body.name, "joints": spec["joints"]}
 
 
-def _body(file: Path, spec: dict[str, Any]) -> Embodiment:
+def body_from_spec(file: Path, spec: dict[str, Any]) -> Embodiment:
+    """Inverse of ``body_spec``.
+
+    Raises:
+        EmbodimentError: a robot that the catalog does not know, or knows with other joints.
+        MotionError: the description is incomplete.
+    """
     try:
         body = catalog.from_spec(spec) if spec.get("kind") == "human" else catalog.get(str(spec["name"]))
     except EmbodimentError as error:
         raise EmbodimentError(f"{file}: {error}") from error
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise MotionError(f"{file}: a body is described wrongly ({type(error).__name__}: {error})") from error
     joints = [feature.name for feature in body.features]
-    if body.kind == "robot" and joints != spec["joints"]:
-        raise EmbodimentError(f"{file}: robot {body.name!r} has joints {joints}, the motions {spec['joints']}")
+    if body.kind == "robot" and joints != spec.get("joints"):
+        raise EmbodimentError(f"{file}: robot {body.name!r} has joints {joints}, the motions {spec.get('joints')}")
     return body
 
 
