@@ -45,11 +45,12 @@ class ConfidencePolicy:
 
     @classmethod
     def for_reach(cls, reach: float) -> ConfidencePolicy:
-        """Thresholds for a robot whose arm is ``reach`` [m] long: slow from half of it, hold from all of it.
+        """Thresholds for a robot whose arm is ``reach`` [m] long: slow from 0.75 of it, hold from 1.25 of it.
 
-        A bound as long as the arm says nothing about where the wrist will be.
+        The bound of a fitted pair is about half the reach, that of a chain of two about three quarters; one larger than
+        the arm says nothing about where the wrist will be.
         """
-        return cls(slow=0.5 * reach, hold=reach)
+        return cls(slow=0.75 * reach, hold=1.25 * reach)
 
     def factor(self, bound: float, tracking: float) -> float:
         """Speed factor in [0, 1]; 0 means hold. A bound or confidence that is not a number holds."""

@@ -10,6 +10,7 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import SydaError, TeleoperationError
 from syda_gym.mappings.chain import ChainMapping
+from syda_gym.mappings.coded import CodedMapping
 from syda_gym.mappings.mapping import Mapping
 
 __all__ = ["GuardedMapping", "Mapped"]
@@ -61,12 +62,22 @@ class GuardedMapping:
         for link, gain in zip(self.links, self._gains, strict=True):
             if self._bounded:
                 bound = bound * gain + float(link.error_bound(current)[0])
-            if self._familiar and not unfamiliar:
-                unfamiliar = bool(link.unfamiliar(current)[0])
-            current = link(current)
+            current, odd = self._through(link, current)
+            unfamiliar = unfamiliar or odd
         if not np.isfinite(current).all():
             raise TeleoperationError(f"{self.mapping!r} gave joint angles that are not finite")
         return Mapped(current, bound, unfamiliar)
+
+    def _through(self, link: Mapping, frame: FloatArray) -> tuple[FloatArray, bool]:
+        """One link's image of a frame and whether the frame was unfamiliar to it."""
+        if isinstance(link, CodedMapping) and link.confidence is not None:
+            # Image and familiarity rest on the same code; asking for each would encode the frame twice.
+            codes = link.source_coder.encode(frame[None])
+            image = link.target_coder.decode(link.regressor(codes))[0]
+            if isinstance(link.target, Robot) and link.target is not self.robot:
+                image = link.target.clamp(image)[0]  # the last robot's limits are the limiter's business
+            return image, self._familiar and bool(link.confidence.unfamiliar(codes)[0])
+        return link(frame), self._familiar and bool(link.unfamiliar(frame)[0])
 
     def _knows(self, question: str, notice: str) -> bool:
         """Whether every link answers; links that were fitted on too little, or not fitted at all, do not."""

@@ -42,8 +42,8 @@ class LoopSettings:
         soft_start: seconds over which the speed grows when following begins.
         silence: seconds without a good frame until the robot holds.
         hold: further seconds until it eases to rest.
-        bound_slow: error bound [m] from which the robot slows; ``None`` for half the robot's reach.
-        bound_hold: error bound [m] from which it holds; ``None`` for the robot's reach.
+        bound_slow: error bound [m] from which the robot slows; ``None`` for 0.75 of the robot's reach.
+        bound_hold: error bound [m] from which it holds; ``None`` for 1.25 of it.
         unfamiliar: speed factor for poses unlike all that the mapping was fitted on.
         self_collision: distance [m] that links keep; negative switches the check off.
 

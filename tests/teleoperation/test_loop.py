@@ -113,7 +113,7 @@ def test_a_large_error_bound_slows_then_holds_then_eases(
 ) -> None:
     stage = Stage(mapping).calibrated(adult).run(wave, 2.0)
     assert stage.decisions[-1].factor == 1.0
-    mapping.bound = 0.75 * mapping.target.reach
+    mapping.bound = mapping.target.reach
     slowed = stage.feed(wave(2.0))
     assert slowed.factor == pytest.approx(1 - 0.85 * 0.5, abs=0.01)
     assert "confidence: slowed" in slowed.reasons
