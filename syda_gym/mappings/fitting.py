@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from syda_gym.errors import MappingError, OptionError, nearest_name
+from syda_gym.mappings.classic import fit_accurate, fit_kernel_ridge, fit_nearest, fit_ridge
 from syda_gym.mappings.coded import CodedMapping
 from syda_gym.mappings.direct import fit_direct_paper
+from syda_gym.mappings.general import fit_direct_general, fit_general, fit_interpolation
+from syda_gym.mappings.geometric import fit_fixed_axes, fit_mink, fit_procrustes
 from syda_gym.mappings.jobs import FitJob, Fitter, check_pair
 from syda_gym.mappings.syda import fit_paper
 from syda_gym.mappings.training import Progress
@@ -38,8 +41,21 @@ class Method:
 
 
 METHODS: dict[str, Method] = {
-    "syda": Method({"paper": fit_paper}, True, "dual autoencoder with shared synergies; maps both ways"),
-    "direct": Method({"paper": fit_direct_paper}, False, "encoder of A, decoder of B, trained one way"),
+    "syda": Method(
+        {"general": fit_general, "accurate": fit_accurate, "interpolation": fit_interpolation, "paper": fit_paper},
+        True,
+        "dual autoencoder with shared synergies; maps both ways",
+    ),
+    "direct": Method(
+        {"general": fit_direct_general, "paper": fit_direct_paper}, False, "encoder of A, decoder of B, trained one way"
+    ),
+    "ridge": Method({"general": fit_ridge}, False, "ridge regression per arm"),
+    "kernel_ridge": Method({"general": fit_kernel_ridge}, False, "kernel ridge regression per arm"),
+    "nearest": Method({"general": fit_nearest}, False, "the most similar training frame"),
+    "geometric": Method(
+        {"procrustes": fit_procrustes, "fixed": fit_fixed_axes}, True, "a rotation, then closed-form inverse kinematics"
+    ),
+    "mink": Method({"procrustes": fit_mink}, False, "the same decoded by mink (extra 'ik')"),
 }
 """Every method by name."""
 

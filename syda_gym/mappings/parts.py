@@ -2,16 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-from syda_gym.mappings.coders import Coder, PositionCoder, QuaternionCoder
+from syda_gym.embodiments.embodiment import Embodiment
+from syda_gym.errors import StorageError, nearest_name
+from syda_gym.mappings.arm_coders import HumanArmCoder, RobotArmCoder
+from syda_gym.mappings.coders import Arrays, Coder, PositionCoder, QuaternionCoder
+from syda_gym.mappings.geometric import GeometricRegressor
+from syda_gym.mappings.heads import HeadedRegressor
+from syda_gym.mappings.linear import KernelRidge, Nearest, Ridge
+from syda_gym.mappings.mink_ik import MinkArmCoder
 from syda_gym.mappings.regressors import DirectRegressor, DualRegressor, Regressor
+from syda_gym.mappings.residual import HopRegressor, MeanRegressor, TwoWay
 
-__all__ = ["CODERS", "REGRESSORS"]
+__all__ = ["CODERS", "REGRESSORS", "restore_coder", "restore_regressor"]
 
-CODERS: dict[str, Callable[..., Coder]] = {cls.kind: cls for cls in (PositionCoder, QuaternionCoder)}
-"""Kind to class; called with body, settings and arrays."""
+CODERS = {coder.kind: coder for coder in (PositionCoder, QuaternionCoder, HumanArmCoder, RobotArmCoder, MinkArmCoder)}
+"""Kind to class."""
 
-REGRESSORS: dict[str, type[Regressor] | Any] = {cls.kind: cls for cls in (DualRegressor, DirectRegressor)}
-"""Kind to class; rebuilt by ``restore(settings, arrays)``."""
+REGRESSORS: dict[str, type[Regressor]] = {
+    model.kind: model
+    for model in (
+        DualRegressor,
+        DirectRegressor,
+        Ridge,
+        KernelRidge,
+        Nearest,
+        HeadedRegressor,
+        HopRegressor,
+        MeanRegressor,
+        TwoWay,
+        GeometricRegressor,
+    )
+}
+"""Kind to class."""
+
+
+def restore_coder(entry: dict[str, Any], body: Embodiment, arrays: Arrays) -> Coder:
+    """Rebuilds a coder from its stored kind, settings and arrays.
+
+    Raises:
+        StorageError: an unknown kind.
+    """
+    kind = str(entry["kind"])
+    if kind not in CODERS:
+        raise StorageError(f"unknown coder {kind!r}; {nearest_name(kind, CODERS)}")
+    return CODERS[kind](body, entry["settings"], arrays)
+
+
+def restore_regressor(entry: dict[str, Any], arrays: Arrays) -> Regressor:
+    """Rebuilds a regressor from its stored kind, settings and arrays.
+
+    Raises:
+        StorageError: an unknown kind.
+    """
+    kind = str(entry["kind"])
+    if kind not in REGRESSORS:
+        raise StorageError(f"unknown model {kind!r}; {nearest_name(kind, REGRESSORS)}")
+    return REGRESSORS[kind].restore(entry["settings"], arrays)

@@ -10,7 +10,7 @@ import numpy as np
 
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
-from syda_gym.errors import StorageError, SydaError, nearest_name
+from syda_gym.errors import StorageError, SydaError
 from syda_gym.files import atomic_path, fingerprint, read_json, write_json
 from syda_gym.mappings.card import MappingCard
 from syda_gym.mappings.chain import ChainMapping
@@ -18,7 +18,7 @@ from syda_gym.mappings.coded import CodedMapping
 from syda_gym.mappings.coders import Coder
 from syda_gym.mappings.confidence import Confidence
 from syda_gym.mappings.mapping import Mapping
-from syda_gym.mappings.parts import CODERS, REGRESSORS
+from syda_gym.mappings.parts import restore_coder, restore_regressor
 from syda_gym.mappings.regressors import Regressor
 
 __all__ = ["load_mapping", "save_mapping"]
@@ -153,9 +153,9 @@ def _rebuild(entry: dict[str, Any], arrays: Arrays, where: Path) -> CodedMapping
     _check_features(card.target_features, target, where)
     mapping = CodedMapping(
         card,
-        _coder(entry["source_coder"], source, _below(arrays, "source_coder/"), where),
-        _coder(entry["target_coder"], target, _below(arrays, "target_coder/"), where),
-        _regressor(entry["regressor"], _below(arrays, "regressor/"), where),
+        restore_coder(entry["source_coder"], source, _below(arrays, "source_coder/")),
+        restore_coder(entry["target_coder"], target, _below(arrays, "target_coder/")),
+        restore_regressor(entry["regressor"], _below(arrays, "regressor/")),
         *(
             Confidence.restore(entry[name], arrays, name) if entry[name] else None
             for name in ("confidence", "confidence_back")
@@ -185,20 +185,6 @@ def _check_features(stored: list[str], body: Embodiment, where: Path) -> None:
     now = [f"{feature.name} [{feature.unit}]" for feature in body.features]
     if stored != now:
         raise StorageError(f"{where}: stored features of {body.name!r} are {stored}, the body has {now}; fit again")
-
-
-def _coder(entry: dict[str, Any], body: Embodiment, arrays: Arrays, where: Path) -> Coder:
-    kind = str(entry["kind"])
-    if kind not in CODERS:
-        raise StorageError(f"{where}: unknown coder {kind!r}; {nearest_name(kind, CODERS)}")
-    return CODERS[kind](body, entry["settings"], arrays)
-
-
-def _regressor(entry: dict[str, Any], arrays: Arrays, where: Path) -> Regressor:
-    kind = str(entry["kind"])
-    if kind not in REGRESSORS:
-        raise StorageError(f"{where}: unknown model {kind!r}; {nearest_name(kind, REGRESSORS)}")
-    return REGRESSORS[kind].restore(entry["settings"], arrays)
 
 
 def _below(arrays: Arrays, prefix: str) -> Arrays:

@@ -80,7 +80,7 @@ def test_progress_is_reported(adult_pepper):
 
 def test_unknown_names_are_explained(adult_pepper):
     with pytest.raises(OptionError, match="did you mean 'syda'"):
-        fit(adult_pepper, "sida")
+        fit(adult_pepper, "syd")
     with pytest.raises(OptionError, match="paper"):
         fit(adult_pepper, preset="papers")
     with pytest.raises(OptionError, match="epochs"):

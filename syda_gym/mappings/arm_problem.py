@@ -1,0 +1,165 @@
+"""ArmProblem: a pair's frames as codes per arm, with the lag removed: where all methods start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from syda_gym.embodiments import landmark_error
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.errors import MappingError
+from syda_gym.mappings.arm_coders import HumanArmCoder, RobotArmCoder, arm_coder, shared_arms
+from syda_gym.mappings.card import card_of
+from syda_gym.mappings.coded import CodedMapping
+from syda_gym.mappings.confidence import Confidence, action_maximum, fit_confidence, gain
+from syda_gym.mappings.heads import HeadedRegressor, fit_head
+from syda_gym.mappings.jobs import FitJob
+from syda_gym.mappings.lag import estimate_lags, shift_targets
+from syda_gym.mappings.regressors import Regressor
+from syda_gym.motions.clip import PairedMotions
+
+__all__ = ["ArmProblem", "RowFitter", "fit_problems"]
+
+ArmCoder = HumanArmCoder | RobotArmCoder
+RowFitter = Callable[[Sequence["ArmProblem"]], list[Regressor]]
+"""Fits one regressor between the main codes of each problem, all together where that is faster."""
+
+_MAX_HELD_OUT = 10
+_MAX_ROWS = 8000
+
+
+@dataclass(frozen=True, eq=False)
+class ArmProblem:
+    """What a regressor is fitted to.
+
+    Attributes:
+        pair: the training frames.
+        seed: of the fit.
+        source_coder: calibrated to the training frames.
+        target_coder: calibrated to the training frames.
+        source: codes ``(N, K, D)``.
+        target: codes ``(N, K, E)``, lag removed.
+        lags: recording to shift [frames].
+    """
+
+    pair: PairedMotions
+    seed: int
+    source_coder: ArmCoder
+    target_coder: ArmCoder
+    source: FloatArray
+    target: FloatArray
+    lags: dict[str, int]
+
+    @classmethod
+    def build(cls, pair: PairedMotions, seed: int, max_lag: int, placed: bool = False) -> ArmProblem:
+        """Calibrates, encodes, and removes the lag of a human who mimicked a robot."""
+        sides = shared_arms(pair.source_body, pair.target_body)
+        source_coder = arm_coder(pair.source_body, pair.source, sides[0], placed)
+        target_coder = arm_coder(pair.target_body, pair.target, sides[1], placed)
+        source, target = source_coder.encode(pair.source), target_coder.encode(pair.target)
+        mimicry = pair.source_body.kind == "human" and pair.target_body.kind == "robot"
+        lags = estimate_lags(pair, source, target[..., :6], max_lag if mimicry else 0)
+        shifted = shift_targets(pair, target, lags)
+        return cls(pair, seed, source_coder, target_coder, source, shifted, lags)
+
+    @property
+    def rows(self) -> tuple[FloatArray, FloatArray]:
+        """Main codes arm by arm, ``(N * K, D)`` and ``(N * K, E)``, without extra joints; thinned if very many."""
+        x = self.source[..., : main_width(self.source_coder)]
+        y = self.target[..., : main_width(self.target_coder)]
+        step = -(-len(x) * x.shape[1] // _MAX_ROWS)
+        return x[::step].reshape(-1, x.shape[-1]), y[::step].reshape(-1, y.shape[-1])
+
+    def without(self, actions: Sequence[str], max_lag: int, placed: bool = False) -> ArmProblem:
+        """The same problem with some actions held out, calibrated anew."""
+        return ArmProblem.build(self.pair.without_actions(actions), self.seed, max_lag, placed)
+
+
+def main_width(coder: ArmCoder) -> int:
+    """Width of a code without the extra joints of a robot."""
+    return 6 if isinstance(coder, RobotArmCoder) else coder.width
+
+
+def fit_problems(
+    jobs: Sequence[FitJob],
+    method: str,
+    fitter: RowFitter,
+    *,
+    max_lag: int,
+    confidence: bool,
+    placed: bool = False,
+) -> list[CodedMapping]:
+    """Fits mappings per arm, each with extra-joint heads and, if wanted, a confidence both ways.
+
+    Args:
+        jobs: what to fit.
+        method: name for the card.
+        fitter: fits the regressors.
+        max_lag: largest lag searched for [frames].
+        confidence: also hold actions out, for the error bound.
+        placed: whether a human's code says where the shoulder is.
+
+    Returns:
+        One mapping per job.
+    """
+    problems = [ArmProblem.build(job.pair, job.seed, max_lag, placed) for job in jobs]
+    groups = [_groups(problem.pair) if confidence else [] for problem in problems]
+    held_out = [problem.without(g, max_lag, placed) for problem, gs in zip(problems, groups, strict=True) for g in gs]
+    fitted = iter(fitter([*problems, *held_out]))
+    mains = [assemble(problem, next(fitted)) for problem in problems]
+    trials = iter([assemble(problem, next(fitted)) for problem in held_out])
+    result = []
+    for job, problem, parts, group in zip(jobs, problems, mains, groups, strict=True):
+        card = card_of(job.pair, method, job.preset, job.seed, job.options)
+        mapping = CodedMapping(card, *parts)
+        if confidence:
+            tests = [(job.pair.only_actions(actions), CodedMapping(card, *next(trials))) for actions in group]
+            mapping.confidence, mapping.confidence_back = _confidences(mapping, problem, tests)
+        result.append(mapping)
+    return result
+
+
+def assemble(problem: ArmProblem, regressor: Regressor) -> tuple[ArmCoder, ArmCoder, Regressor]:
+    """Coders and regressor of a mapping; extra joints get heads of their own."""
+    a, b = problem.source_coder, problem.target_coder
+    extras_a, extras_b = a.width - main_width(a), b.width - main_width(b)
+    if not extras_a and not extras_b:
+        return a, b, regressor
+    head = fit_head(problem.source, problem.target[..., main_width(b) :])
+    back = fit_head(problem.target, problem.source[..., main_width(a) :])
+    return a, b, HeadedRegressor(regressor, head, back, main_width(a), main_width(b))
+
+
+def _groups(pair: PairedMotions) -> list[list[str]]:
+    """Actions to hold out together: one by one, or in at most ten groups."""
+    names = list(pair.action_names)
+    if len(names) < 2:
+        return []
+    count = min(len(names), _MAX_HELD_OUT)
+    return [names[start::count] for start in range(count)]
+
+
+def _confidences(
+    mapping: CodedMapping, problem: ArmProblem, tests: list[tuple[PairedMotions, CodedMapping]]
+) -> tuple[Confidence, Confidence | None]:
+    forward = _confidence(mapping, problem.pair, tests)
+    try:
+        back = mapping.inverse()
+        turned = [(pair.reversed(), trial.inverse()) for pair, trial in tests]
+    except MappingError:  # this model has no inverse, hence no confidence for it
+        return forward, None
+    return forward, _confidence(back, problem.pair.reversed(), turned)
+
+
+def _confidence(
+    mapping: CodedMapping, pair: PairedMotions, tests: list[tuple[PairedMotions, CodedMapping]]
+) -> Confidence:
+    bound = None
+    if tests:
+        errors = [landmark_error(mapping.target, trial(test.source), test.target).mean(axis=1) for test, trial in tests]
+        bound = action_maximum(np.concatenate(errors), np.concatenate([test.actions for test, _ in tests]))
+    rows = np.linspace(0, len(pair) - 1, min(len(pair), 400)).astype(int)
+    enlargement = gain(mapping.source, mapping.target, pair.source[rows], mapping(pair.source[rows]))
+    return fit_confidence(mapping.source_coder.encode(pair.source), pair.actions, bound, enlargement)

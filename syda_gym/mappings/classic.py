@@ -1,0 +1,115 @@
+"""The classic regressors as methods: ridge, kernel ridge, nearest neighbour, and the ``accurate`` ensemble.
+
+All work per arm on the codes of ``arm_coders``; robots are decoded by inverse kinematics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.errors import OptionError
+from syda_gym.mappings.arm_problem import ArmProblem, fit_problems
+from syda_gym.mappings.coded import CodedMapping
+from syda_gym.mappings.general import GENERAL, fit_networks, take_options
+from syda_gym.mappings.jobs import FitJob
+from syda_gym.mappings.linear import KernelRidge, Nearest, Ridge
+from syda_gym.mappings.regressors import Regressor
+from syda_gym.mappings.residual import HopRegressor, MeanRegressor, TwoWay
+from syda_gym.mappings.training import Progress
+
+__all__ = ["fit_accurate", "fit_kernel_ridge", "fit_nearest", "fit_ridge"]
+
+_COMMON = {"lag": 6, "confidence": True}
+
+
+def fit_ridge(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
+    """Ridge regression. Options: ``lag`` (6), ``confidence`` (true), ``shrinkage`` (0.1)."""
+    own = _options(jobs, {**_COMMON, "shrinkage": 0.1})
+    return _fit(jobs, "ridge", own, lambda x, y: Ridge.fit(x, y, float(own["shrinkage"])))
+
+
+def fit_kernel_ridge(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
+    """Kernel ridge regression. Options: ``lag`` (0), ``confidence`` (true), ``shrinkage`` (1e-3), ``gamma`` (1)."""
+    own = _options(jobs, {"lag": 0, "confidence": True, "shrinkage": 1e-3, "gamma": 1.0})
+    return _fit(
+        jobs, "kernel_ridge", own, lambda x, y: KernelRidge.fit(x, y, float(own["shrinkage"]), float(own["gamma"]))
+    )
+
+
+def fit_nearest(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
+    """Nearest neighbour. Options: ``confidence`` (true), ``neighbours`` (1), ``lag`` (0)."""
+    own = _options(jobs, {"lag": 0, "confidence": True, "neighbours": 1})
+    return _fit(jobs, "nearest", own, lambda x, y: Nearest.fit(x, y, int(own["neighbours"])))
+
+
+def fit_accurate(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
+    """The ``accurate`` preset: the mean of four regressors, fitted both ways; between humans the hop of ``general``.
+
+    Robust ridge, and kernel ridge of what the geometric image leaves over, each once on the whole code and once on limb
+    directions alone; back to a human robust ridge, kernel ridge and the inverse of ``general``. Options: ``lag``
+    (8), ``confidence`` (true), ``shrinkage`` (0.1), ``gamma`` (0.3), ``kernel_shrinkage`` (3), ``hop_shrinkage`` (10).
+    """
+    own = _options(
+        jobs,
+        {
+            "lag": 8,
+            "confidence": True,
+            "shrinkage": 0.1,
+            "gamma": 0.3,
+            "kernel_shrinkage": 3.0,
+            "hop_shrinkage": 10.0,
+        },
+    )
+
+    def fitter(problems: Sequence[ArmProblem]) -> list[Regressor]:
+        if problems[0].pair.source_body.kind == problems[0].pair.target_body.kind:
+            return [HopRegressor.fit(*problem.rows, float(own["hop_shrinkage"])) for problem in problems]
+        networks = fit_networks(problems, GENERAL, progress)
+        return [_both_ways(problem, network, own) for problem, network in zip(problems, networks, strict=True)]
+
+    return fit_problems(jobs, "syda", fitter, max_lag=int(own["lag"]), confidence=bool(own["confidence"]))
+
+
+def _both_ways(problem: ArmProblem, network: Regressor, own: dict[str, Any]) -> Regressor:
+    """Four members towards a robot; towards a human two of them and the inverse of the SyDa network."""
+    human, robot = problem.rows
+    to_robot = robot.shape[1] == 6
+    back = network.inverse()
+    if not to_robot:
+        human, robot, network, back = robot, human, back, network
+    shrinkage, penalty, gamma = (float(own[name]) for name in ("shrinkage", "kernel_shrinkage", "gamma"))
+    width = human.shape[1]
+    members: list[Regressor] = []
+    for start in (0, width - 6):
+        members.append(Ridge.fit(human[:, start:], robot, shrinkage, robust=True))
+        members.append(KernelRidge.fit(human[:, start:], robot - human[:, -6:], penalty, gamma))
+    columns = [(0, width), (0, width), (width - 6, width), (width - 6, width)]
+    there = MeanRegressor(members, columns, [False, True, False, True])
+    reverse: list[Regressor] = [
+        Ridge.fit(robot, human, shrinkage, robust=True),
+        KernelRidge.fit(robot, human, penalty, gamma),
+        back,
+    ]
+    home = MeanRegressor(reverse, [(0, 6)] * 3, [False] * 3)
+    return TwoWay(there, home) if to_robot else TwoWay(home, there)
+
+
+def _fit(
+    jobs: Sequence[FitJob],
+    method: str,
+    own: dict[str, Any],
+    fit_rows: Callable[[FloatArray, FloatArray], Regressor],
+) -> list[CodedMapping]:
+    def fitter(problems: Sequence[ArmProblem]) -> list[Regressor]:
+        return [fit_rows(*problem.rows) for problem in problems]
+
+    return fit_problems(jobs, method, fitter, max_lag=int(own["lag"]), confidence=bool(own["confidence"]))
+
+
+def _options(jobs: Sequence[FitJob], defaults: dict[str, Any]) -> dict[str, Any]:
+    own, unknown = take_options(jobs[0].options, defaults)
+    if unknown:
+        raise OptionError(f"unknown options {sorted(unknown)}; known: {sorted(defaults)}")
+    return own

@@ -1,0 +1,155 @@
+"""The presets of SyDa that generalise: ``general`` (the default) and ``interpolation``.
+
+Both share one dual autoencoder between a body's arms, the right arm mirrored (``arm_coders``), add the cross losses
+A-to-B and B-to-A to Eq. 2 to 4, and decode a robot's limb directions by inverse kinematics within its limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.errors import OptionError
+from syda_gym.mappings.arm_problem import ArmProblem, fit_problems
+from syda_gym.mappings.coded import CodedMapping
+from syda_gym.mappings.jobs import FitJob
+from syda_gym.mappings.regressors import DirectRegressor, DualRegressor, Regressor
+from syda_gym.mappings.residual import HopRegressor
+from syda_gym.mappings.scaling import Scaler
+from syda_gym.mappings.syda import with_options
+from syda_gym.mappings.training import Job, Progress, TrainingSettings, train
+
+__all__ = [
+    "GENERAL",
+    "INTERPOLATION",
+    "fit_direct_general",
+    "fit_general",
+    "fit_interpolation",
+    "fit_networks",
+    "take_options",
+]
+
+GENERAL = TrainingSettings(
+    hidden_a=(),
+    hidden_b=(),
+    latent=6,
+    slope=1.0,
+    activated=False,
+    cross=1.0,
+    rate=3e-3,
+    decay=1e-2,
+    cosine=True,
+    batch=64,
+    epochs=80,
+    noise=0.25,
+)
+"""Linear encoder and decoder with six synergies an arm: low capacity is what carries over to unseen actions."""
+
+INTERPOLATION = TrainingSettings(
+    hidden_a=(64, 64),
+    hidden_b=(64, 64),
+    latent=10,
+    slope=0.01,
+    activated=False,
+    cross=1.0,
+    rate=3e-3,
+    cosine=True,
+    batch=64,
+    epochs=200,
+)
+"""For test poses that come from trained actions: capacity pays there."""
+
+_LAG = 6
+_HOP_SHRINKAGE = 10.0
+_ROWS_PER_STEP = 32
+
+
+def fit_general(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
+    """SyDa with shared arms, low capacity, cross losses and lag compensation; between humans a hop.
+
+    Options: ``lag`` (largest lag searched for, 6 frames), ``confidence`` (hold actions out for the error bound, true),
+    ``hop_shrinkage`` (10), and the fields of ``TrainingSettings``.
+    """
+    return _fit(jobs, GENERAL, "syda", progress)
+
+
+def fit_direct_general(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
+    """The direct autoencoder with the codes, sizes and loss of ``general``."""
+    return _fit(jobs, replace(GENERAL, dual=False), "direct", progress)
+
+
+def fit_interpolation(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
+    """SyDa with shared arms and 64-64-10 networks, without lag compensation.
+
+    Options as for ``general``.
+    """
+    return _fit(jobs, INTERPOLATION, "syda", progress, lag=0, placed=True)
+
+
+def take_options(options: dict[str, Any], defaults: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Splits options into those named in ``defaults`` (filled up) and the others.
+
+    Raises:
+        OptionError: a value of another type than its default, or a negative number.
+    """
+    own = {name: options.get(name, default) for name, default in defaults.items()}
+    for name, value in own.items():
+        expected = type(defaults[name])
+        fits = isinstance(value, bool) if expected is bool else isinstance(value, int | float) and value >= 0
+        if not fits:
+            raise OptionError(f"option {name!r} must be a {expected.__name__} (not negative), got {value!r}")
+    return own, {name: value for name, value in options.items() if name not in defaults}
+
+
+def _fit(
+    jobs: Sequence[FitJob],
+    preset: TrainingSettings,
+    method: str,
+    progress: Progress | None,
+    lag: int = _LAG,
+    placed: bool = False,
+) -> list[CodedMapping]:
+    own, rest = take_options(jobs[0].options, {"lag": lag, "confidence": True, "hop_shrinkage": _HOP_SHRINKAGE})
+    settings = with_options(preset, rest)
+
+    def fitter(problems: Sequence[ArmProblem]) -> list[Regressor]:
+        if method == "syda" and problems[0].pair.source_body.kind == problems[0].pair.target_body.kind:
+            return [HopRegressor.fit(*problem.rows, float(own["hop_shrinkage"])) for problem in problems]
+        return fit_networks(problems, settings, progress)
+
+    return fit_problems(
+        jobs, method, fitter, max_lag=int(own["lag"]), confidence=bool(own["confidence"]), placed=placed
+    )
+
+
+def fit_networks(
+    problems: Sequence[ArmProblem], settings: TrainingSettings, progress: Progress | None
+) -> list[Regressor]:
+    """Trains one network per problem on its rows, all together."""
+    scales, data = [], []
+    for problem in problems:
+        x, y = problem.rows
+        scale_a, scale_b = _isotropic(x), _isotropic(y)
+        scales.append((scale_a, scale_b))
+        data.append(Job(scale_a(x), scale_b(y), problem.seed))
+    # Larger recordings take larger batches, not more steps: the time of a fit stays the same.
+    most = max(len(job.a) for job in data)
+    settings = replace(settings, batch=max(settings.batch, -(-most // _ROWS_PER_STEP)))
+    kind = DualRegressor if settings.dual else DirectRegressor
+    trained = train(data, settings, progress)
+    return [kind(stacks, *scale) for stacks, scale in zip(trained, scales, strict=True)]
+
+
+def _isotropic(rows: FloatArray) -> Scaler:
+    """Standardises every 3-vector of a human's code, or all of a robot's, by one number.
+
+    So all directions in space count alike.
+    """
+    mean, spread = rows.mean(axis=0), rows.std(axis=0)
+    size = rows.shape[1] if rows.shape[1] == 6 else 3
+    blocks = np.sqrt(np.mean(spread.reshape(-1, size) ** 2, axis=1))
+    return Scaler(mean, np.maximum(np.repeat(blocks, size), 1e-3))
