@@ -135,8 +135,8 @@ def _body(motions: Motions, name: str) -> BodyInfo:
     for clip in clips:
         steps = np.linalg.norm(np.diff(body.landmarks(clip.frames)[:, 1::2], axis=0), axis=-1) * clip.fps
         if clip.filled is not None:  # the jump at the end of a gap is no speed
-            gap = clip.filled.any(axis=1)
-            steps = steps[~(gap[1:] | gap[:-1])]
+            gap = np.flatnonzero(clip.filled.any(axis=1))
+            steps = np.delete(steps, np.concatenate([gap, gap - 1]).clip(0, max(0, len(steps) - 1)), axis=0)
         fastest = max(fastest, float(steps.max(initial=0.0)))
     return BodyInfo(
         name, body.kind, tuple(body.sides), body.n_features, body.height, float(lengths[0]), float(lengths[1]),

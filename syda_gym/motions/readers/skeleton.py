@@ -18,7 +18,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from syda_gym.embodiments.embodiment import FloatArray, Side
 from syda_gym.embodiments.human import HumanSkeleton
-from syda_gym.errors import MotionError
+from syda_gym.errors import EmbodimentError, MotionError
 from syda_gym.motions.clip import Motions, Take
 from syda_gym.motions.readers.joint_names import missing_hint
 
@@ -37,6 +37,7 @@ _LEAST_TRACKED = 0.3
 _HEADING_SECONDS = 0.5
 _STATURE_PER_ARM = 1.0 / 0.332
 MAX_FRAMES = 1_000_000
+_LARGEST = 1e9  # in the file's unit; beyond it lengths lose their precision, and no camera sees so far
 
 
 class MotionWarning(UserWarning):
@@ -101,7 +102,7 @@ def motions_from(recording: Recording, body: str = "operator") -> Motions:
     basis = _basis(recording, joints, sides, fps)
     _check_forward(recording, joints, basis)
     points = np.stack([np.stack([joints[s[0].upper() + p] for p in _ARM], axis=1) for s in sides], axis=1)
-    human = _human(body, points, joints, basis, sides)
+    human = _human(recording.path, body, points, joints, basis, sides)
     origin = _middle(joints, points, basis, human)
     local = np.einsum("nij,nakj->naki", basis, points - origin[:, None, None])
     frames = human.frames_from_points(local)
@@ -182,6 +183,10 @@ def _filled(
     gaps: dict[str, NDArray[np.bool_]] = {}
     for name, raw in recording.joints.items():
         values = raw[keep]
+        huge = np.flatnonzero((np.abs(values) > _LARGEST).any(axis=1))
+        if len(huge):
+            place = recording.where(int(keep[huge[0]]))
+            raise MotionError(f"{recording.path}, {place}: {name} has a coordinate beyond {_LARGEST:.0e}")
         lost: NDArray[np.bool_] = np.asarray(~np.isfinite(values).all(axis=1))
         tracked = 1.0 - float(lost.mean())
         if tracked < _LEAST_TRACKED:
@@ -319,7 +324,12 @@ def _check_forward(recording: Recording, joints: Mapping[str, FloatArray], basis
 
 
 def _human(
-    name: str, points: FloatArray, joints: Mapping[str, FloatArray], basis: FloatArray, sides: tuple[Side, ...]
+    path: Path,
+    name: str,
+    points: FloatArray,
+    joints: Mapping[str, FloatArray],
+    basis: FloatArray,
+    sides: tuple[Side, ...],
 ) -> HumanSkeleton:
     links = np.median(np.linalg.norm(np.diff(points, axis=2), axis=-1), axis=(0, 1))
     stature = float(links.sum()) * _STATURE_PER_ARM
@@ -332,9 +342,12 @@ def _human(
     shoulders = 0.173 * stature
     if len(sides) == 2:
         shoulders = float(np.median(np.linalg.norm(points[:, 0, 0] - points[:, 1, 0], axis=-1)))
-    return HumanSkeleton(
-        name, height=stature, upper_arm=float(links[0]), forearm=float(links[1]), shoulders=shoulders, sides=sides
-    )
+    try:
+        return HumanSkeleton(
+            name, height=stature, upper_arm=float(links[0]), forearm=float(links[1]), shoulders=shoulders, sides=sides
+        )
+    except EmbodimentError as error:
+        raise MotionError(f"{path}: the joints make no human: {error}") from error
 
 
 def _middle(
