@@ -52,11 +52,11 @@ def console(*, stderr: bool = False) -> Console:
     return Console(stderr=stderr)
 
 
-def print_table(table: Any) -> None:
-    """Prints a ``syda_gym.evaluation.report.Table`` on the terminal."""
+def print_table(table: Any, most_columns: int | None = None) -> None:
+    """Prints a ``syda_gym.evaluation.report.Table`` on the terminal, only its first columns if so asked."""
     from syda_gym.evaluation.terminal import rich_table
 
-    console().print(rich_table(table))
+    console().print(rich_table(table, most_columns=most_columns))
 
 
 @contextmanager
@@ -123,11 +123,120 @@ def demo(
         )
     print_table(transferability_table(result))
     for operator, route in result.chosen.items():
-        console().print(f"Route chosen for [bold]{operator}[/]: [bold]{' > '.join(route)}[/]")
-    print_table(chain_table(result))
+        ties = "".join(f"; {' > '.join(other.bodies)} lies within sampling noise" for other in route.ties)
+        console().print(f"Route chosen for [bold]{operator}[/]: [bold]{' > '.join(route.bodies)}[/]{ties}")
+    print_table(chain_table(result), 8)
     if result.residual:
         print_table(result.residual.table())
     console().print(f"\nReport: [bold]{result.report}[/]  (open it in a browser)")
+
+
+motions_app = typer.Typer(help="Look at recordings, check paired data sets, convert them.", no_args_is_help=True)
+app.add_typer(motions_app, name="motions")
+
+
+@motions_app.command("info")
+def motions_info(
+    spec: Annotated[str, typer.Argument(help="`embedded`, `format:PATH`, or a path.", metavar="SPEC")],
+    picture: Annotated[Path | None, typer.Option(help="PNG to draw stick figures into.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Say what a recording holds: bodies, actions, rate, gaps, and the units and axes that were found."""
+    import json
+    import warnings
+
+    from rich.table import Table
+
+    from syda_gym.motions import MotionWarning, describe
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MotionWarning)  # the notes below say the same
+        info = describe(spec, picture=picture)
+    if as_json:
+        typer.echo(json.dumps(info.to_dict(), indent=1))
+        return
+    rate = f"{info.fps[0]:.4g}" if info.fps[0] == info.fps[1] else f"{info.fps[0]:.4g} to {info.fps[1]:.4g}"
+    kind = "synthetic, " if info.synthetic else ""
+    say = console()
+    say.print(
+        f"[bold]{info.name}[/]: {kind}{info.takes} takes of {len(info.actions)} actions, {info.frames} frames, "
+        f"{info.seconds:.1f} s at {rate} frames per second{', with timestamps' if info.timestamps else ''}"
+    )
+    table = Table(
+        "body", "kind", "arms", "stature [m]", "upper arm [m]", "forearm [m]", "frames", "filled", "fastest [m/s]"
+    )
+    for body in info.bodies:
+        lengths = (f"{body.height:.2f}", f"{body.upper_arm:.3f}", f"{body.forearm:.3f}")
+        share = f"{100 * body.filled:.1f} %"
+        table.add_row(
+            body.name, body.kind, "+".join(body.sides), *lengths, str(body.frames), share, f"{body.fastest:.1f}"
+        )
+    say.print(table)
+    if info.pairs:
+        say.print("paired frames: " + ", ".join(f"{a}-{b} {count}" for a, b, count in info.pairs))
+    if info.families:
+        say.print("families: " + ", ".join(info.families))
+    say.print("actions: " + ", ".join(info.actions))
+    for note in info.notes:
+        say.print(f"- {note}", markup=False)
+    if picture is not None:
+        say.print(f"picture: [bold]{picture}[/]")
+
+
+@motions_app.command("check")
+def motions_check(
+    folder: Annotated[Path, typer.Argument(help="A data set folder with `dataset.json`.")],
+) -> None:
+    """Check a paired data set: every fault with its place, and how well each action pairs up."""
+    from syda_gym.motions import validate_dataset
+
+    findings = validate_dataset(folder)
+    say = console()
+    colours = {"error": "red", "warning": "yellow", "info": "green"}
+    for finding in findings:
+        say.print(f"[{colours[finding.level]}]{finding.level:>7}[/]", end=" ")
+        say.print(f"{finding.place}: {finding.message}", markup=False, highlight=False, soft_wrap=True)
+    errors = sum(finding.level == "error" for finding in findings)
+    say.print(f"{errors} errors, {sum(finding.level == 'warning' for finding in findings)} warnings")
+    if errors:
+        raise typer.Exit(code=1)
+
+
+@motions_app.command("convert")
+def motions_convert(
+    spec: Annotated[str, typer.Argument(help="`embedded`, `format:PATH`, or a path.", metavar="SPEC")],
+    out: Annotated[Path, typer.Argument(help="An `.npz` file, or a folder for a data set.")],
+    fps: Annotated[float | None, typer.Option(help="Resample to this rate.")] = None,
+    operator: Annotated[
+        str, typer.Option(help="Re-express `operator` as this human of the catalog, say `adult`.")
+    ] = "",
+) -> None:
+    """Convert a recording into a motion file or a data set folder."""
+    from syda_gym.embodiments import HumanSkeleton, catalog
+    from syda_gym.errors import EmbodimentError
+    from syda_gym.motions import conformed, load_motions, save_motions, write_dataset
+
+    motions = load_motions(spec, fps=fps)
+    if operator:
+        body = catalog.get(operator)
+        if not isinstance(body, HumanSkeleton):
+            raise EmbodimentError(f"{operator!r} is a {body.kind}; a recorded operator can only become a human")
+        motions = conformed(motions, "operator", body)
+    written = save_motions(motions, out) if out.suffix == ".npz" else write_dataset(motions, out)
+    console().print(f"written: [bold]{written}[/]")
+
+
+@motions_app.command("formats")
+def motions_formats() -> None:
+    """List the formats that can be read."""
+    from rich.table import Table
+
+    from syda_gym.motions import FORMATS
+
+    table = Table("prefix", "what", "usual endings")
+    for entry in FORMATS.values():
+        table.add_row(f"{entry.name}:", entry.description, " ".join(entry.endings))
+    console().print(table)
 
 
 def _command() -> str:
