@@ -15,7 +15,7 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, StorageError, nearest_name
 from syda_gym.evaluation.chains import Links, Route, action_groups, all_routes, name_of, robots_of
 from syda_gym.evaluation.episodes import EpisodeFigures, Recording, figures_of, latency, make_env, play_all
-from syda_gym.evaluation.statistics import Estimate, estimate
+from syda_gym.evaluation.statistics import Estimate, clustered_estimate
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from syda_gym.evaluation.demo_residual import ResidualResult
     from syda_gym.mappings.mapping import Mapping
     from syda_gym.transferability.metric import Transferability
+    from syda_gym.transferability.routing import Route as BestRoute
 
 __all__ = ["ChainResult", "DemoResult", "run_demo"]
 
@@ -61,14 +62,14 @@ class ChainResult:
         return name_of(self.route)
 
     def figure(self, name: str) -> Estimate:
-        """Interquartile mean over episodes with an interval stratified by action."""
+        """Interquartile mean over episodes; the interval is over actions, for the next user will do other ones."""
         values = [float(getattr(episode, name)) for episode in self.episodes]
-        return estimate(values, [episode.action for episode in self.episodes])
+        return clustered_estimate(values, [episode.action for episode in self.episodes])
 
     def part(self, name: str, index: int) -> Estimate:
         """The same for one landmark or joint of ``landmarks`` or ``joints``."""
         values = [float(getattr(episode, name)[index]) for episode in self.episodes]
-        return estimate(values, [episode.action for episode in self.episodes])
+        return clustered_estimate(values, [episode.action for episode in self.episodes])
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +96,7 @@ class DemoResult:
     held_out: tuple[tuple[str, ...], ...]
     links: dict[tuple[str, str], Transferability]
     paper_links: dict[tuple[str, str], Transferability]
-    chosen: dict[str, Route]
+    chosen: dict[str, BestRoute]
     chains: tuple[ChainResult, ...]
     models: int
     residual: ResidualResult | None
@@ -144,10 +145,7 @@ def run_demo(
     with clock("transferability"):
         links, paper_links = _measure(data, routes, tell)
         products = {route: float(np.prod([links[edge].T for edge in _edges(route)])) for route in routes}
-        chosen = {
-            operator: max((r for r in routes if r[0] == operator), key=lambda r: (round(products[r], 6), -len(r)))
-            for operator in operators
-        }
+        chosen = {operator: _best(data, routes, operator, driven.name) for operator in operators}
     fitted = Links(data, seed=seed, groups=groups)
     with clock("fit"):
         edges = list(dict.fromkeys(edge for route in routes for edge in _edges(route)))
@@ -164,7 +162,7 @@ def run_demo(
         from syda_gym.evaluation.demo_residual import train_and_compare
 
         with clock("residual"):
-            learned = train_and_compare(data, chosen[operators[0]], seed, lambda done: tell("residual", done))
+            learned = train_and_compare(data, chosen[operators[0]].bodies, seed, lambda done: tell("residual", done))
     result = DemoResult(
         data, driven, tuple(groups), links, paper_links, chosen, tuple(chains), fitted.count(), learned,
         clock.seconds, seed,
@@ -255,6 +253,15 @@ def _measure(
         if {a, b} <= in_paper:
             paper[a, b] = transferability(a, b, "paper")
     return general, paper
+
+
+def _best(motions: Motions, routes: list[Route], operator: str, robot: str) -> BestRoute:
+    from syda_gym.transferability.routing import best_route
+
+    pairs = list(dict.fromkeys(edge for route in routes for edge in _edges(route)))
+    fitted = [(motions.bodies[a], motions.bodies[b]) for a, b in pairs]
+    ends = motions.bodies[operator], motions.bodies[robot]
+    return best_route(*ends, fitted, max_hops=2, directed=True, samples=_SAMPLES)
 
 
 def _play_chain(

@@ -121,7 +121,7 @@ def transferability_table(result: DemoResult) -> Table:
         Column("T, paper's definition", digits=4),
         Column("Table 2", digits=4, tip="as the paper printed it"),
     ]
-    chosen = {edge for route in result.chosen.values() for edge in zip(route[:-1], route[1:], strict=True)}
+    chosen = {edge for route in _chosen_routes(result) for edge in zip(route[:-1], route[1:], strict=True)}
     strong = [index for index, edge in enumerate(result.links) if edge in chosen]
     return Table("Transferability of every fitted pair", columns, rows, "Links of a chosen route are marked.", strong)
 
@@ -161,10 +161,10 @@ def chain_table(result: DemoResult) -> Table:
         ]
         for chain in result.chains
     ]
-    strong = [i for i, chain in enumerate(result.chains) if chain.route in result.chosen.values()]
+    strong = [i for i, chain in enumerate(result.chains) if chain.route in _chosen_routes(result)]
     note = (
-        "Intervals are 95 % bootstrap intervals stratified by action. The route that transferability chooses for each "
-        "operator is marked."
+        "Intervals are 95 % bootstrap intervals over actions. The route that transferability chooses for each operator "
+        "is marked."
     )
     return Table("Every chain as episodes", columns, rows, note, strong)
 
@@ -205,7 +205,7 @@ def _headlines(result: DemoResult, best: ChainResult) -> list[Headline]:
     error = best.figure("landmark_error")
     operator = best.route[0]
     route = result.chosen[operator]
-    product = next(chain.transferability for chain in result.chains if chain.route == route)
+    ties = ", ".join(name_of(other.bodies) for other in route.ties)
     lines = [
         Headline(
             f"Landmark error, {best.name}",
@@ -213,7 +213,11 @@ def _headlines(result: DemoResult, best: ChainResult) -> list[Headline]:
             f"95 % interval {100 * error.low:.1f} to {100 * error.high:.1f} cm, {error.count} unseen episodes",
             "good" if error.value < 0.1 else "warn",
         ),
-        Headline(f"Route chosen for {operator}", " > ".join(route), f"transferability {product:.3f}"),
+        Headline(
+            f"Route chosen for {operator}",
+            " > ".join(route.bodies),
+            f"transferability {route.T:.3f}" + (f"; within sampling noise of {ties}" if ties else ""),
+        ),
         Headline("Success", f"{100 * _mean(best, 'success'):.0f} %", "episodes below 10 cm of mean landmark error"),
     ]
     coverage = _mean(best, "coverage")
@@ -225,9 +229,13 @@ def _headlines(result: DemoResult, best: ChainResult) -> list[Headline]:
     return lines
 
 
+def _chosen_routes(result: DemoResult) -> list[tuple[str, ...]]:
+    return [route.bodies for route in result.chosen.values()]
+
+
 def _best_chain(result: DemoResult) -> ChainResult:
     """The chosen chain of the first operator."""
-    route = next(iter(result.chosen.values()))
+    route = next(iter(result.chosen.values())).bodies
     return next(chain for chain in result.chains if chain.route == route)
 
 
@@ -255,7 +263,7 @@ def _landmark_plot(result: DemoResult) -> BarPlot:
 
 def _joint_plot(result: DemoResult) -> BarPlot:
     groups = [_short(name) for name in result.robot.joint_names]
-    best = list(result.chosen.values())
+    best = _chosen_routes(result)
     shown = [chain for chain in result.chains if chain.route in best or len(chain.route) == 2][:4]
     series = {chain.name: [chain.part("joints", i) for i in range(len(groups))] for chain in shown}
     return BarPlot("Error of each chain at each joint", "joint error [degrees]", groups, series, 180 / np.pi)
@@ -273,7 +281,7 @@ def _graph(result: DemoResult) -> RouteGraph:
     bodies = {body: result.motions.bodies[body].kind for edge in result.links for body in edge}
     errors = {chain.route: chain.figure("mapping_error").value for chain in result.chains if len(chain.route) == 2}
     edges = [RouteEdge(a, b, link.T, errors.get((a, b))) for (a, b), link in result.links.items()]
-    chosen = next(iter(result.chosen.values()))
+    chosen = next(iter(result.chosen.values())).bodies
     note = f"Thicker arrows carry a higher transferability; the route chosen for {chosen[0]} is coloured."
     return RouteGraph("Fitted pairs and the chosen route", dict(bodies), edges, chosen, note)
 
@@ -332,7 +340,7 @@ def _results(result: DemoResult) -> dict[str, Any]:
         "seed": result.seed,
         "held_out": [list(group) for group in result.held_out],
         "transferability": {name_of(edge): link.as_dict() for edge, link in result.links.items()},
-        "chosen": {operator: list(route) for operator, route in result.chosen.items()},
+        "chosen": {operator: route.as_dict() for operator, route in result.chosen.items()},
         "chains": {
             chain.name: {
                 "transferability": chain.transferability,

@@ -66,14 +66,15 @@ def standalone(svg: str) -> str:
 
 def _bars(plot: BarPlot) -> str:
     lines = 1 + (len(plot.series) - 1) // 4
-    canvas = _Canvas(720, 320, left=64, right=12, top=24 + 20 * lines, bottom=36)
+    slanted = max(len(group) for group in plot.groups) * 7.4 > 644 / len(plot.groups)
+    canvas = _Canvas(720, 360 if slanted else 320, left=64, right=12, top=24 + 20 * lines, bottom=78 if slanted else 36)
     values = [v * plot.scale for es in plot.series.values() for e in es for v in (e.value, e.high)]
     canvas.y_axis([0.0, *values], plot.label)
     group_width = canvas.inner_width / len(plot.groups)
     bar_width = min(46.0, 0.78 * group_width / len(plot.series))
     for g, group in enumerate(plot.groups):
         middle = canvas.left + (g + 0.5) * group_width
-        canvas.text(middle, canvas.bottom + 21, group, anchor="middle")
+        canvas.text(middle, canvas.bottom + (14 if slanted else 21), group, anchor="middle", slanted=slanted)
         for s, (name, estimates) in enumerate(plot.series.items()):
             x = middle + (s - len(plot.series) / 2) * bar_width
             _bar(canvas, x, bar_width, estimates[g], plot.scale, s, f"{name}, {group}")
@@ -146,8 +147,12 @@ class _Canvas:
     def add(self, element: str) -> None:
         self._parts.append(element)
 
-    def text(self, x: float, y: float, words: str, *, anchor: str = "start", soft: bool = False) -> None:
+    def text(
+        self, x: float, y: float, words: str, *, anchor: str = "start", soft: bool = False, slanted: bool = False
+    ) -> None:
         style = ' class="soft"' if soft else ""
+        if slanted:
+            anchor, style = "end", f'{style} transform="rotate(-32 {x:.1f} {y:.1f})"'
         self.add(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}"{style}>{escape(words)}</text>')
 
     def y(self, value: float) -> float:

@@ -32,7 +32,7 @@
     filter.addEventListener("input", () => {
       const words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
       for (const row of filter.parentElement.querySelector("tbody").rows) {
-        const text = row.textContent.toLowerCase();
+        const text = [...row.cells].filter((cell) => cell.dataset.v === undefined).map((cell) => cell.textContent).join(" ").toLowerCase();
         row.hidden = !words.every((word) => text.includes(word));
       }
     });

@@ -1,0 +1,333 @@
+"""Does transferability predict? Its rank correlation with the held-out error of chains, beside simpler rivals.
+
+Every pair of bodies is fitted without the actions of a fold and every chain is scored on them, so that no frame of a
+test action is seen by any link. A chain's error is the mean distance of elbows and wrists [m] over the target's arm
+length, on the arms that all its bodies have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syda_gym.embodiments.embodiment import Embodiment, FloatArray, Side
+from syda_gym.errors import MotionError, OptionError
+from syda_gym.evaluation.prediction_scores import PredictorScore, score_predictors
+from syda_gym.mappings.fitting import fit_many
+from syda_gym.mappings.mapping import Mapping
+from syda_gym.motions.clip import Motions
+from syda_gym.motions.loading import load_motions
+from syda_gym.transferability.metric import Transferability, transferability
+from syda_gym.transferability.noise import alpha_from_noise, high_frequency_noise
+
+__all__ = ["PredictionStudy", "RouteResult", "validate"]
+
+Progress = Callable[[str, float], None]
+Names = tuple[str, ...]
+
+_LAG_SECONDS = 0.2
+_MOST_TEST_FRAMES = 250
+_MOST_TRAINING_FRAMES = 400
+
+
+@dataclass(frozen=True)
+class RouteResult:
+    """A chain of bodies and how well it carried held-out actions.
+
+    Attributes:
+        bodies: names from source to target.
+        error: mean landmark error over the target's arm length.
+        metres: mean landmark error [m].
+        predicted: predictor to score, higher is better.
+    """
+
+    bodies: Names
+    error: float
+    metres: float
+    predicted: dict[str, float]
+
+    @property
+    def hops(self) -> int:
+        """Number of links."""
+        return len(self.bodies) - 1
+
+
+@dataclass(frozen=True)
+class PredictionStudy:
+    """What ``validate`` found.
+
+    Attributes:
+        motions: name of the recordings.
+        synthetic: whether they were generated.
+        bodies: who took part.
+        method: of the fitted mappings.
+        folds: groups of actions held out in turn.
+        seed: of folds and fits.
+        noise: body to high-frequency noise over arm length.
+        links: ordered pair to its transferability, general definition.
+        routes: every chain with its error and predictors.
+        scores: every predictor with its rank correlations, best first.
+    """
+
+    motions: str
+    synthetic: bool
+    bodies: Names
+    method: str
+    folds: int
+    seed: int
+    noise: dict[str, float]
+    links: dict[tuple[str, str], Transferability]
+    routes: tuple[RouteResult, ...]
+    scores: tuple[PredictorScore, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything, JSON-able."""
+        return {
+            "motions": self.motions,
+            "synthetic": self.synthetic,
+            "bodies": list(self.bodies),
+            "method": self.method,
+            "folds": self.folds,
+            "seed": self.seed,
+            "noise": self.noise,
+            "scores": [score.as_dict() for score in self.scores],
+            "routes": [
+                {"bodies": list(r.bodies), "error": r.error, "metres": r.metres, "predicted": r.predicted}
+                for r in self.routes
+            ],
+        }
+
+
+def validate(
+    motions: str | Motions = "embedded",
+    *,
+    bodies: Sequence[str] | None = None,
+    method: str = "syda",
+    preset: str | None = None,
+    folds: int = 4,
+    fps: float = 5.0,
+    max_hops: int = 3,
+    samples: int = 2**18,
+    seed: int = 0,
+    resamples: int = 1000,
+    progress: Progress | None = None,
+) -> PredictionStudy:
+    """Measures how well transferability and its rivals predict the error of every route.
+
+    Args:
+        motions: recordings in which all bodies move together.
+        bodies: who takes part; everybody by default.
+        method: how pairs are fitted, see ``fitting.METHODS``; one model serves both ways where it inverts.
+        preset: of the method.
+        folds: into how many groups the actions are split; each is held out once. As many as actions is full LOAO.
+        fps: frames per second that are kept; neighbours at 30 Hz are near-duplicates.
+        max_hops: longest chain.
+        samples: Sobol samples per arm for the general definition.
+        seed: of folds, fits and samples.
+        resamples: bootstrap samples of the intervals.
+        progress: told the stage (``fit``, ``chains``) and its finished fraction.
+
+    Returns:
+        Routes, errors, predictors and their rank correlations.
+
+    Raises:
+        MotionError: fewer than three bodies or two actions recorded together.
+        OptionError: folds or hops out of range.
+    """
+    full = load_motions(motions)
+    names = tuple(bodies) if bodies else tuple(full.bodies)
+    table = _Frames.of(load_motions(full, fps=fps), names)
+    if not 2 <= folds <= len(table.distinct):
+        raise OptionError(f"folds must be between 2 and the number of actions, {len(table.distinct)}; got {folds}")
+    if max_hops < 1:
+        raise OptionError(f"max_hops must be at least 1, got {max_hops}")
+    noise = _noise(full, names)
+    links = _links(table.bodies, samples, seed)
+    groups = np.array_split(np.random.default_rng(seed).permutation(table.distinct), folds)
+    fits = _fit_all(table, groups, method, preset, seed, max(1, round(_LAG_SECONDS * fps)), progress)
+    training, errors = _errors(table, groups, fits, max_hops, progress)
+    routes = _results(table.bodies, links, alpha_from_noise(noise), training, errors)
+    return PredictionStudy(
+        motions=full.name,
+        synthetic=full.synthetic,
+        bodies=names,
+        method=method,
+        folds=folds,
+        seed=seed,
+        noise=noise,
+        links=links["general"],
+        routes=routes,
+        scores=score_predictors(routes, seed=seed, resamples=resamples),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Frames:
+    """Frames of all bodies at the same instants."""
+
+    motions: Motions
+    bodies: dict[str, Embodiment]
+    frames: dict[str, FloatArray]
+    actions: NDArray[np.str_]
+
+    @classmethod
+    def of(cls, motions: Motions, names: Names) -> _Frames:
+        missing = [name for name in names if name not in motions.bodies]
+        takes = [take for take in motions.takes if all(name in take.frames for name in names)]
+        if missing or len(names) < 3 or len({take.action for take in takes}) < 2:
+            raise MotionError(
+                f"{motions.name}: validation needs at least three bodies recorded together in two actions; "
+                f"{', '.join(names)} share {len(takes)} takes"
+            )
+        together = Motions(motions.name, tuple(takes), motions.bodies, motions.families, motions.synthetic)
+        frames = {name: np.concatenate([take.frames[name] for take in takes]) for name in names}
+        actions = np.concatenate([np.repeat(take.action, len(take.frames[names[0]])) for take in takes])
+        return cls(together, {name: motions.bodies[name] for name in names}, frames, actions)
+
+    @property
+    def distinct(self) -> NDArray[np.str_]:
+        return np.unique(self.actions)
+
+    def rows(self, held: NDArray[np.str_], test: bool) -> NDArray[np.intp]:
+        """Rows of the held-out actions, or of the others, evenly thinned to a bearable number."""
+        rows = np.flatnonzero(np.isin(self.actions, held) == test)
+        most = _MOST_TEST_FRAMES if test else _MOST_TRAINING_FRAMES
+        return rows[:: max(1, -(-len(rows) // most))]
+
+
+def _noise(motions: Motions, names: Names) -> dict[str, float]:
+    """High-frequency noise of each body's landmarks over its arm length, at the full frame rate."""
+    found = {}
+    for name in names:
+        body = motions.bodies[name]
+        clips = [body.landmarks(clip.frames) for clip in motions.clips(name) if len(clip) > 3]
+        found[name] = high_frequency_noise(clips) / body.reach
+    return found
+
+
+def _links(bodies: dict[str, Embodiment], samples: int, seed: int) -> dict[str, dict[tuple[str, str], Transferability]]:
+    ends = list(permutations(bodies, 2))
+    return {
+        "general": {(a, b): transferability(bodies[a], bodies[b], samples=samples, seed=seed) for a, b in ends},
+        "paper": {(a, b): transferability(bodies[a], bodies[b], "paper") for a, b in ends},
+    }
+
+
+def _fit_all(
+    table: _Frames,
+    groups: Sequence[NDArray[np.str_]],
+    method: str,
+    preset: str | None,
+    seed: int,
+    lag: int,
+    progress: Progress | None,
+) -> list[dict[tuple[str, str], Mapping]]:
+    """Mappings of every ordered pair, per fold."""
+    order = sorted(table.bodies, key=lambda name: table.bodies[name].kind)  # human to robot is the fitted direction
+    pairs = [(a, b) for i, a in enumerate(order) for b in order[i + 1 :]]
+    fits: list[dict[tuple[str, str], Mapping]] = [{} for _ in groups]
+    options: dict[str, Any] = {"lag": lag, "confidence": False} if preset != "paper" else {}
+    for done, (a, b) in enumerate(pairs):
+        pair = table.motions.pair(a, b)
+        models = fit_many(
+            [pair.without_actions(list(group)) for group in groups], method, preset, [seed] * len(groups), **options
+        )
+        for fold, model in zip(fits, models, strict=True):
+            fold[a, b], fold[b, a] = model, model.inverse()
+        if progress:
+            progress("fit", (done + 1) / len(pairs))
+    return fits
+
+
+def _errors(
+    table: _Frames,
+    groups: Sequence[NDArray[np.str_]],
+    fits: list[dict[tuple[str, str], Mapping]],
+    max_hops: int,
+    progress: Progress | None,
+) -> tuple[dict[tuple[str, str], float], dict[Names, float]]:
+    """Training error of every link over arm length, and held-out error of every route [m], means over folds."""
+    training: dict[tuple[str, str], list[float]] = {}
+    held: dict[Names, list[float]] = {}
+    steps, done = len(groups) * len(table.bodies), 0
+    for group, fold in zip(groups, fits, strict=True):
+        rows, seen = table.rows(group, test=True), table.rows(group, test=False)
+        for (a, b), link in fold.items():
+            error = _error(table, (a, b), link(table.frames[a][seen]), seen)
+            training.setdefault((a, b), []).append(error / table.bodies[b].reach)
+        for source in table.bodies:
+            _walk(table, fold, rows, (source,), table.frames[source][rows], max_hops, held)
+            done += 1
+            if progress:
+                progress("chains", done / steps)
+    return {k: float(np.mean(v)) for k, v in training.items()}, {k: float(np.mean(v)) for k, v in held.items()}
+
+
+def _walk(
+    table: _Frames,
+    fold: dict[tuple[str, str], Mapping],
+    rows: NDArray[np.intp],
+    path: Names,
+    frames: FloatArray,
+    hops: int,
+    held: dict[Names, list[float]],
+) -> None:
+    """Scores every route that continues ``path``, whose last body moves as ``frames``; shared beginnings run once."""
+    for name in table.bodies:
+        if name not in path:
+            route = (*path, name)
+            mapped = fold[path[-1], name](frames)
+            held.setdefault(route, []).append(_error(table, route, mapped, rows))
+            if hops > 1:
+                _walk(table, fold, rows, route, mapped, hops - 1, held)
+
+
+def _error(table: _Frames, route: Names, mapped: FloatArray, rows: NDArray[np.intp]) -> float:
+    """Mean distance of elbows and wrists [m] on the arms that all bodies of the route have."""
+    body = table.bodies[route[-1]]
+    shared: list[Side] = [side for side in body.sides if all(side in table.bodies[name].sides for name in route)]
+    arms = [body.sides.index(side) for side in shared or body.sides]
+    gap = body.arm_points(mapped)[:, arms, 1:] - body.arm_points(table.frames[route[-1]][rows])[:, arms, 1:]
+    return float(np.linalg.norm(gap, axis=-1).mean())
+
+
+def _results(
+    bodies: dict[str, Embodiment],
+    links: dict[str, dict[tuple[str, str], Transferability]],
+    alpha: dict[frozenset[str], float],
+    training: dict[tuple[str, str], float],
+    errors: dict[Names, float],
+) -> tuple[RouteResult, ...]:
+    results = []
+    for route, metres in errors.items():
+        steps = list(zip(route[:-1], route[1:], strict=True))
+        general = [links["general"][step] for step in steps]
+        whole = links["general"][route[0], route[-1]]
+        predicted = {
+            "T": np.prod([link.T for link in general]),
+            "T_with_noise_alpha": np.prod(
+                [link.T * alpha[frozenset(step)] for link, step in zip(general, steps, strict=True)]
+            ),
+            "paper_T": np.prod([links["paper"][step].T for step in steps]),
+            "C": np.prod([link.C for link in general]),
+            "L": np.prod([link.L for link in general]),
+            "coverage": np.prod([link.coverage for link in general]),
+            "symmetric_C": np.prod(
+                [link.C * links["general"][b, a].C for link, (a, b) in zip(general, steps, strict=True)]
+            ),
+            "noise_alpha": np.prod([alpha[frozenset(step)] for step in steps]),
+            "arm_length_ratio": whole.L,
+            "hops": -float(len(steps)),
+            "training_error": -sum(training[step] for step in steps),
+        }
+        results.append(
+            RouteResult(
+                route, metres / bodies[route[-1]].reach, metres, {name: float(v) for name, v in predicted.items()}
+            )
+        )
+    return tuple(results)
