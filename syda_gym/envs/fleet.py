@@ -21,7 +21,7 @@ from syda_gym.envs.scripts import Scripts
 from syda_gym.envs.starts import StartSampler
 from syda_gym.envs.tracking import TERMS, reward_terms
 from syda_gym.errors import OptionError
-from syda_gym.simulation.backend import make_world
+from syda_gym.simulation.backend import MotorConditions, make_world
 
 __all__ = ["EpisodeWish", "Fleet"]
 
@@ -91,6 +91,12 @@ class Fleet:
         self._cuts = np.r_[0, n + 3 * np.arange(2 * points)].astype(np.intp)
         self._points = points
         self.world = self._new_world()
+        # Commands of the present episodes: what a pickled Bullet world is led back by.
+        frames = self.repertoire.longest + 2 if options.physics == "bullet" else 0
+        self._journal = np.zeros((count, frames, n))
+        self._robots = np.arange(count)
+        self._start_q = np.repeat(self.robot.rest[None], count, axis=0)
+        self._conditions = [MotorConditions()] * count
         zeros = np.zeros((count, n))
         self._k = np.zeros(count, dtype=np.intp)
         self._length = np.zeros(count, dtype=np.intp)
@@ -136,11 +142,13 @@ class Fleet:
             self.clip[index], self._k[index], self.route[index] = clip, frame, route
             conditions = self._scripts.write(index, clip, frame, route, rng)
             if conditions is not None:
+                self._conditions[index] = conditions
                 self.world.set_conditions(index, conditions)
         self._start[rows] = self._frame[rows] = k = self._k[rows]
         self._length[rows] = self._scripts.lengths[self.clip[rows]]
         base = self._scripts.base(rows, k)[:, : self._n]
         self.world.reset(rows, base)
+        self._start_q[rows] = base
         self._base[rows] = self._command[rows] = base
         self._correction[rows] = 0.0
         self._action[rows] = 0.0 if self._residual else base
@@ -181,6 +189,8 @@ class Fleet:
         change = correction - self._correction
         if options.history:
             self._remember(base)
+        if self._journal.size:
+            self._journal[self._robots, k] = command
         self.world.advance(command)
         pose = self.world.pose
         self._frame = k
@@ -281,9 +291,48 @@ class Fleet:
             "transferability": route.transferability,
         }
 
+    def pose(self, index: int) -> dict[str, FloatArray]:
+        """What a picture of one robot shows: ``q``, ``reference``, ``operator`` and ``errors``."""
+        n = self._n
+        return {
+            "q": self.world.pose[index, :n],
+            "reference": self._target[index, :n],
+            "operator": self._scripts.operator_of_all(self._frame)[index],
+            "errors": self._distances[index, : self._points],
+        }
+
     def close(self) -> None:
         """Releases the world."""
         self.world.close()
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = self.__dict__.copy()
+        if self.options.physics == "bullet":
+            del state["world"]
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if self.options.physics == "bullet":
+            self.world = self._new_world()
+            self._replay()
+
+    def _replay(self) -> None:
+        """Leads a fresh world to where the pickled one was: every robot repeats its commands since its reset."""
+        steps = self._k - self._start
+        for index in range(self.count):
+            self.world.set_conditions(index, self._conditions[index])
+        self.world.reset(np.arange(self.count), self._start_q)
+        longest = int(steps.max())
+        for time in range(longest):
+            late = np.flatnonzero(longest - steps == time)
+            if len(late) and time:
+                self.world.reset(late, self._start_q[late])
+            past = np.minimum(self._start + np.maximum(time - (longest - steps), 0), self._journal.shape[1] - 1)
+            self.world.advance(self._journal[self._robots, past])
+        fresh = np.flatnonzero(steps == 0)
+        if len(fresh) and longest:
+            self.world.reset(fresh, self._start_q[fresh])
 
     def _new_world(self) -> Any:
         options = self.options

@@ -16,6 +16,7 @@ from syda_gym.envs.tracking import RewardWeights
 from syda_gym.errors import OptionError, nearest_name
 from syda_gym.motions.clip import Motions
 from syda_gym.simulation.backend import BACKENDS
+from syda_gym.simulation.camera import CameraView
 from syda_gym.simulation.rates import Rates
 
 if TYPE_CHECKING:
@@ -67,11 +68,13 @@ class TeleopOptions:
     success_error: float = 0.1
     start: str = "first"
     disturbances: str | Disturbances | Dict[str, Any] | None = None
+    camera: CameraView | Dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
         Rates(self.control_hz, self.physics_hz)
         RewardWeights.resolve(self.reward)
         Disturbances.resolve(self.disturbances)
+        CameraView.resolve(self.camera)
         for name, allowed in (
             ("action_mode", ACTION_MODES),
             ("reference", REFERENCES),

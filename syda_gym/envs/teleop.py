@@ -13,8 +13,11 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.envs.face import Face
 from syda_gym.envs.fleet import Fleet
 from syda_gym.envs.options import TeleopOptions
+from syda_gym.envs.rendering import Painter
 from syda_gym.envs.spaces import action_from_command, action_space, one_info, wishes
 from syda_gym.errors import OptionError, SydaError
+from syda_gym.simulation.camera import CameraView, Picture
+from syda_gym.simulation.window import has_display
 
 __all__ = ["SydaTeleopEnv"]
 
@@ -41,10 +44,16 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
         self.options = TeleopOptions.of(options, changes)
         self.render_mode = render_mode
         self._fleet = Fleet(self.options, 1)
-        self.metadata = {**type(self).metadata, "render_fps": round(self._fleet.rates.control_hz)}
+        self.metadata = {
+            # Without a display, 'human' is not offered, so that tools which try every mode leave it alone.
+            "render_modes": [mode for mode in type(self).metadata["render_modes"] if mode != "human" or has_display()],
+            "render_fps": round(self._fleet.rates.control_hz),
+        }
         self.observation_space = Box(self.layout.low, self.layout.high, dtype=np.float32)
         self.action_space = action_space(self.robot, self.options)
         self._started = False
+        self._painter = Painter(CameraView.resolve(self.options.camera))
+        self._pictures: list[Picture] = []
 
     def action_from_command(self, command: ArrayLike) -> FloatArray:
         """The action whose command comes nearest to ``command``, in either action mode.
@@ -74,7 +83,11 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
         wish = wishes(self._fleet.repertoire, options, 1)
         self._fleet.reset([0], [self.np_random], wish)
         self._started = True
-        return self._fleet.observe()[0], self._info()
+        observation = self._fleet.observe()[0]
+        if self.render_mode in ("human", "rgb_array_list"):
+            self._pictures.clear()
+            self._draw()
+        return observation, self._info()
 
     def step(self, action: Action) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
         """One control step.
@@ -91,11 +104,42 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
         fleet = self._fleet
         fleet.step(np.asarray(action)[None])
         observation = fleet.observe()[0]
+        if self.render_mode in ("human", "rgb_array_list"):
+            self._draw()
         return observation, float(fleet.reward[0]), bool(fleet.terminated[0]), bool(fleet.truncated[0]), self._info()
 
+    def render(self) -> Any:
+        """What the render mode asks for.
+
+        Returns:
+            ``rgb_array``: a picture ``(height, width, 3)`` uint8. ``rgb_array_list``: the pictures since the last call
+            or reset. ``human``: nothing; the window is kept up to date by ``reset`` and ``step``.
+
+        Raises:
+            SydaError: not reset yet.
+        """
+        if self.render_mode is None:
+            gymnasium.logger.warn(
+                "render() does nothing without a render mode; make the environment with render_mode='rgb_array'"
+            )
+            return None
+        if not self._started:
+            raise SydaError("render was called before reset; call reset first")
+        if self.render_mode == "rgb_array_list":
+            pictures, self._pictures = self._pictures, []
+            return pictures
+        return self._painter.picture(self._fleet) if self.render_mode == "rgb_array" else None
+
     def close(self) -> None:
-        """Releases the physics; harmless when repeated."""
+        """Releases physics, camera and window; harmless when repeated."""
         self._fleet.close()
+        self._painter.close()
+
+    def _draw(self) -> None:
+        if self.render_mode == "human":
+            self._painter.show(self._fleet)
+        else:
+            self._pictures.append(self._painter.picture(self._fleet))
 
     def _info(self) -> dict[str, Any]:
         return one_info(self._fleet.info(), self._fleet.names(0), 0)

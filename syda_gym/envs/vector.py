@@ -16,8 +16,10 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.envs.face import Face
 from syda_gym.envs.fleet import Fleet
 from syda_gym.envs.options import TeleopOptions
+from syda_gym.envs.rendering import Painter
 from syda_gym.envs.spaces import action_from_command, action_space, one_info, wishes
 from syda_gym.errors import OptionError, SydaError, nearest_name
+from syda_gym.simulation.camera import CameraView, Picture
 
 __all__ = ["AUTORESET_MODES", "SydaTeleopVectorEnv"]
 
@@ -79,6 +81,7 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         self.single_action_space = action_space(self.robot, self.options)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._painter = Painter(CameraView.resolve(self.options.camera))
         self._rngs: list[np.random.Generator] = []
         self._pending: Flags = np.zeros(self.num_envs, dtype=bool)
         self._everyone: Flags = np.ones(self.num_envs, dtype=bool)
@@ -141,9 +144,16 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         self._pending = fleet.done
         return self._result(fleet.observe(), self._infos())
 
+    def render(self) -> tuple[Picture, ...] | None:
+        """One picture per robot, ``(height, width, 3)`` uint8 each; ``None`` without a render mode."""
+        if self.render_mode is None:
+            return None
+        return tuple(self._painter.picture(self._fleet, index) for index in range(self.num_envs))
+
     def close_extras(self, **_: Any) -> None:
-        """Releases the physics."""
+        """Releases physics and camera."""
         self._fleet.close()
+        self._painter.close()
 
     def _step_and_restart(self, actions: NDArray[np.float32]) -> Result:
         fleet = self._fleet

@@ -1,0 +1,225 @@
+"""Scene: what a camera looks at, built in a PyBullet client that simulates nothing."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.human import BONES, HumanSkeleton
+from syda_gym.embodiments.robot import Robot
+from syda_gym.errors import EmbodimentError
+
+__all__ = ["Marker", "PosedRobot", "PosedSkeleton", "floor_below"]
+
+_BONE_RADIUS = 0.022
+_JOINT_RADIUS = 0.032
+_HEAD_RADIUS = 0.095
+_BONE_COLOR = (0.93, 0.55, 0.22, 1.0)
+_JOINT_COLOR = (0.80, 0.40, 0.12, 1.0)
+_AWAY = (0.0, 0.0, -1000.0)
+_HIDDEN = (1.0, 1.0, 1.0, 0.0)
+
+
+class PosedRobot:
+    """A robot that takes poses and nothing else, its torso frame at ``place``.
+
+    Args:
+        robot: who.
+        client: PyBullet client.
+        place: of the torso frame [m].
+        urdf: another URDF with the same joint names to show instead, for example one with the vendor's meshes.
+
+    Raises:
+        EmbodimentError: PyBullet cannot load the URDF, or it lacks a joint of the robot.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        client: int,
+        place: Sequence[float] = (0.0, 0.0, 0.0),
+        urdf: str | os.PathLike[str] | None = None,
+    ) -> None:
+        import pybullet
+
+        self._bullet, self._client = pybullet, client
+        path = os.fspath(urdf or robot.urdf)
+        try:
+            self.body: int = pybullet.loadURDF(path, useFixedBase=True, physicsClientId=client)
+        except pybullet.error as error:
+            raise EmbodimentError(f"PyBullet cannot load {path}: {error}; check the file and its meshes") from error
+        rows = [
+            pybullet.getJointInfo(self.body, joint, physicsClientId=client)
+            for joint in range(pybullet.getNumJoints(self.body, physicsClientId=client))
+        ]
+        joints = {row[1].decode(): row[0] for row in rows}
+        for name in robot.joint_names:
+            if name not in joints:
+                raise EmbodimentError(f"{path} has no joint {name!r}; it does not show a {robot.name!r}")
+        self._arms = [joints[name] for name in robot.joint_names]
+        self._links = {row[12].decode(): row[0] for row in rows}
+        parents = {row[0]: row[16] for row in rows}
+        self.moving = [link for link in parents if _hangs_on(link, set(self._arms), parents)]
+        self.still = [-1, *(link for link in parents if link not in self.moving)]
+        for name, angle in robot.description.rest.items():
+            if name in joints:
+                pybullet.resetJointState(self.body, joints[name], angle, physicsClientId=client)
+        self._put_torso(self._links.get(robot.description.torso, -1), place)
+
+    def pose(self, q: FloatArray) -> None:
+        """Takes joint angles ``(n,)`` [rad]."""
+        self._bullet.resetJointStatesMultiDof(
+            self.body, self._arms, [[angle] for angle in q.tolist()], physicsClientId=self._client
+        )
+
+    def hide(self, links: Sequence[int]) -> None:
+        """Makes links invisible."""
+        for link in links:
+            self._bullet.changeVisualShape(self.body, link, rgbaColor=_HIDDEN, physicsClientId=self._client)
+
+    def paint(self, color: Sequence[float]) -> None:
+        """Gives all visible parts one colour."""
+        for link in [-1, *self._links.values()]:
+            self._bullet.changeVisualShape(self.body, link, rgbaColor=color, physicsClientId=self._client)
+
+    def lowest(self) -> float:
+        """Height of its lowest point [m]."""
+        boxes = [
+            self._bullet.getAABB(self.body, link, physicsClientId=self._client) for link in [-1, *self._links.values()]
+        ]
+        return float(min(box[0][2] for box in boxes))
+
+    def remove(self) -> None:
+        """Takes the robot out of the scene."""
+        self._bullet.removeBody(self.body, physicsClientId=self._client)
+
+    def _put_torso(self, torso: int, place: Sequence[float]) -> None:
+        bullet, client = self._bullet, self._client
+        base = bullet.getBasePositionAndOrientation(self.body, physicsClientId=client)
+        frame = base
+        if torso >= 0:
+            state = bullet.getLinkState(self.body, torso, computeForwardKinematics=1, physicsClientId=client)
+            frame = (state[4], state[5])
+        inverse = bullet.invertTransform(*frame)
+        moved = bullet.multiplyTransforms(place, (0.0, 0.0, 0.0, 1.0), *bullet.multiplyTransforms(*inverse, *base))
+        bullet.resetBasePositionAndOrientation(self.body, *moved, physicsClientId=client)
+
+
+class PosedSkeleton:
+    """A human drawn as bones and joints, standing at ``place``.
+
+    Args:
+        human: who.
+        client: PyBullet client.
+        place: point on the floor between the feet [m].
+        moving: ``True`` for the arms alone, ``False`` for all the rest, ``None`` for everything.
+    """
+
+    def __init__(self, human: HumanSkeleton, client: int, place: Sequence[float], moving: bool | None = None) -> None:
+        import pybullet
+
+        self._bullet, self._client, self._human = pybullet, client, human
+        self._place = np.asarray(place, dtype=np.float64)
+        standing = {name: points[0] for name, points in human.complete(human.standing()).items()}
+        self._bones: list[tuple[str, str, int]] = []
+        self._balls: list[tuple[str, int]] = []
+        for first, second in BONES:
+            if {first, second} <= set(standing) and _wanted(second, moving):
+                length = float(np.linalg.norm(standing[second] - standing[first]))
+                self._bones.append((first, second, _capsule(pybullet, client, _BONE_RADIUS, length)))
+        for name in standing:
+            if _wanted(name, moving):
+                head = name == "Head"
+                radius, color = (_HEAD_RADIUS, _BONE_COLOR) if head else (_JOINT_RADIUS, _JOINT_COLOR)
+                self._balls.append((name, _ball(pybullet, client, radius, color)))
+        self.pose(human.standing())
+
+    def pose(self, frame: FloatArray) -> None:
+        """Takes a frame ``(F,)`` in the human's own features."""
+        joints = {name: points[0] for name, points in self._human.complete(frame).items()}
+        feet = min(joints[name][2] for name in ("LFoot", "RFoot"))
+        hips = 0.5 * (joints["LHip"] + joints["RHip"])
+        shift = self._place - np.array([hips[0], hips[1], feet - _JOINT_RADIUS])
+        for first, second, body in self._bones:
+            a, b = joints[first] + shift, joints[second] + shift
+            self._move(body, 0.5 * (a + b), _turn_to(b - a))
+        for name, body in self._balls:
+            self._move(body, joints[name] + shift, (0.0, 0.0, 0.0, 1.0))
+
+    def _move(self, body: int, position: FloatArray, orientation: Sequence[float]) -> None:
+        self._bullet.resetBasePositionAndOrientation(body, position.tolist(), orientation, physicsClientId=self._client)
+
+
+class Marker:
+    """A ball whose colour can change."""
+
+    def __init__(self, client: int, radius: float) -> None:
+        import pybullet
+
+        self._bullet, self._client = pybullet, client
+        self._body = _ball(pybullet, client, radius, (0.0, 1.0, 0.0, 1.0))
+        self._color: tuple[float, ...] = ()
+
+    def show(self, position: FloatArray, color: Sequence[float]) -> None:
+        """Puts the ball somewhere in a colour."""
+        self._bullet.resetBasePositionAndOrientation(
+            self._body, position.tolist(), (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client
+        )
+        if tuple(color) != self._color:
+            self._color = tuple(color)
+            self._bullet.changeVisualShape(self._body, -1, rgbaColor=color, physicsClientId=self._client)
+
+    def hide(self) -> None:
+        """Takes the ball out of sight."""
+        self._bullet.resetBasePositionAndOrientation(
+            self._body, _AWAY, (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client
+        )
+
+
+def floor_below(client: int, height: float) -> None:
+    """A light floor whose surface is at ``height`` [m]."""
+    import pybullet
+
+    shape = pybullet.createVisualShape(
+        pybullet.GEOM_BOX, halfExtents=(6.0, 6.0, 0.01), rgbaColor=(0.80, 0.82, 0.85, 1.0), physicsClientId=client
+    )
+    pybullet.createMultiBody(0.0, -1, shape, (0.0, 0.0, height - 0.01), physicsClientId=client)
+
+
+def _hangs_on(link: int, arms: set[int], parents: dict[int, int]) -> bool:
+    while link >= 0:
+        if link in arms:
+            return True
+        link = parents[link]
+    return False
+
+
+def _wanted(joint: str, moving: bool | None) -> bool:
+    return moving is None or (joint[1:] in ("Shoulder", "Elbow", "Hand")) == moving
+
+
+def _ball(bullet: Any, client: int, radius: float, color: Sequence[float]) -> int:
+    shape = bullet.createVisualShape(bullet.GEOM_SPHERE, radius=radius, rgbaColor=color, physicsClientId=client)
+    body: int = bullet.createMultiBody(0.0, -1, shape, _AWAY, physicsClientId=client)
+    return body
+
+
+def _capsule(bullet: Any, client: int, radius: float, length: float) -> int:
+    shape = bullet.createVisualShape(
+        bullet.GEOM_CAPSULE, radius=radius, length=length, rgbaColor=_BONE_COLOR, physicsClientId=client
+    )
+    body: int = bullet.createMultiBody(0.0, -1, shape, _AWAY, physicsClientId=client)
+    return body
+
+
+def _turn_to(direction: FloatArray) -> tuple[float, float, float, float]:
+    """Quaternion (x, y, z, w) that takes z to ``direction``."""
+    x, y, z = (direction / max(float(np.linalg.norm(direction)), 1e-9)).tolist()
+    if z < -1.0 + 1e-9:
+        return (1.0, 0.0, 0.0, 0.0)
+    norm = float(np.sqrt(2.0 * (1.0 + z)))
+    return (-y / norm, x / norm, 0.0, norm / 2.0)
