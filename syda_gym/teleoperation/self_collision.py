@@ -33,6 +33,7 @@ class SelfCollision:
             ``why`` says so.
         why: empty, or the reason for not checking.
         pairs: number of pairs of shapes that are checked.
+        ignored: names of links whose shapes overlap by construction or touch at rest, left out for that.
 
     Raises:
         OptionError: ``margin`` is negative.
@@ -45,6 +46,7 @@ class SelfCollision:
         self.margin = margin
         self.why = ""
         self.pairs = 0
+        self.ignored: tuple[tuple[str, str], ...] = ()
         try:
             self._model, self._shapes = _arm_model(robot)
         except (ValueError, RuntimeError) as error:  # meshes that are missing or broken
@@ -85,6 +87,31 @@ class SelfCollision:
             if hit
         }
         return tuple(sorted(found))
+
+    def ignores_far_links(self) -> bool:
+        """Whether a pair was left out because it touches at rest although the links are no near relatives.
+
+        Then the rest pose is a bad one rather than the shapes too coarse: an arm that rests on the body, say.
+        """
+        if not self.available:
+            return False
+        joints = {self._model.frames[s.parentFrame].name: s.parentJoint for s in self._shapes.geometryObjects}
+        return any(self._steps(joints[a], joints[b]) > 3 for a, b in self.ignored)
+
+    def _steps(self, first: int, second: int) -> int:
+        """Number of joints between two joints of the tree."""
+        parents = self._model.parents
+        above: dict[int, int] = {}
+        count = 0
+        while True:
+            above[first] = count
+            if first == 0:
+                break
+            first, count = parents[first], count + 1
+        count = 0
+        while second not in above:
+            second, count = parents[second], count + 1
+        return above[second] + count
 
     def free_path(self, start: FloatArray, end: FloatArray, step: float = 0.1) -> bool:
         """Whether the straight way from ``start`` (known to be free) to ``end`` is free, tested every ``step`` rad."""
@@ -145,7 +172,17 @@ class SelfCollision:
         poses = self.robot.clamp(rng.uniform(self.robot.lower, self.robot.upper, (_SAMPLES, len(self.robot.lower))))
         often = np.mean([self._hits(pose) for pose in poses], axis=0) > _ALWAYS
         # Pairs within the margin at rest would never let the robot start.
-        self._keep(list(~(often | np.array(self._hits(self.robot.rest), dtype=bool))))
+        left_out = often | np.array(self._hits(self.robot.rest), dtype=bool)
+        self.ignored = tuple(
+            sorted(
+                {
+                    (names[pair.first], names[pair.second])
+                    for pair, out in zip(shapes.collisionPairs, left_out, strict=True)
+                    if out
+                }
+            )
+        )
+        self._keep(list(~left_out))
 
     def _keep(self, chosen: list[bool]) -> None:
         """Keeps only the chosen pairs of shapes and renews the buffers that depend on them."""
