@@ -77,8 +77,8 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
         self._targets = robot.landmarks(streams.reference.reshape(-1, n)).reshape(*shape[:2], -1, 3)
         self._actions = np.zeros((count, n))
         self.raw_features = np.zeros((count, features))
-        self._episode: NDArray[np.integer[Any]] = np.zeros(count, dtype=np.intp)
-        self._step: NDArray[np.integer[Any]] = np.zeros(count, dtype=np.intp)
+        self._episode: NDArray[np.int64] = np.zeros(count, dtype=np.int64)
+        self._step: NDArray[np.int64] = np.zeros(count, dtype=np.int64)
         self._correction: FloatArray = np.zeros((count, n))
         self._below: FloatArray = np.zeros((count, n))
         self._shadow_below: FloatArray = np.zeros((count, n))
@@ -143,7 +143,7 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
         count, n = self.num_envs, self.interface.n
         for agent in self.agents:
             agent.reset(count)
-        self._episode = self.rng.integers(len(self.streams), size=count)
+        self._episode = np.asarray(self.rng.integers(len(self.streams), size=count))
         self._step = np.zeros(count, dtype=np.intp)
         self._correction = np.zeros((count, n))
 
