@@ -162,17 +162,25 @@ def motions_info(
         f"[bold]{info.name}[/]: {kind}{info.takes} takes of {len(info.actions)} actions, {info.frames} frames, "
         f"{info.seconds:.1f} s at {rate} frames per second{', with timestamps' if info.timestamps else ''}"
     )
-    table = Table(
-        "body", "kind", "arms", "stature [m]", "upper arm [m]", "forearm [m]", "frames", "filled", "fastest [m/s]"
-    )
+    units = ("stature\n\\[m]", "upper arm\n\\[m]", "forearm\n\\[m]")
+    table = Table("body", "kind", "arms", *units, "frames", "filled", "fastest\n\\[m/s]")
     for body in info.bodies:
         lengths = (f"{body.height:.2f}", f"{body.upper_arm:.3f}", f"{body.forearm:.3f}")
         share = f"{100 * body.filled:.1f} %"
         table.add_row(
-            body.name, body.kind, "+".join(body.sides), *lengths, str(body.frames), share, f"{body.fastest:.1f}"
+            body.name,
+            body.kind,
+            "both" if len(body.sides) > 1 else body.sides[0],
+            *lengths,
+            str(body.frames),
+            share,
+            f"{body.fastest:.1f}",
         )
     say.print(table)
-    if info.pairs:
+    counts = {count for *_, count in info.pairs}
+    if len(info.pairs) > 3 and len(counts) == 1:
+        say.print(f"paired frames: {counts.pop()} in each of the {len(info.pairs)} pairs of bodies")
+    elif info.pairs:
         say.print("paired frames: " + ", ".join(f"{a}-{b} {count}" for a, b, count in info.pairs))
     if info.families:
         say.print("families: " + ", ".join(info.families))

@@ -25,7 +25,16 @@ def kinect(tmp_path: Path) -> Path:
 def test_info_says_units_axes_and_draws(kinect: Path, tmp_path: Path) -> None:
     result = run(app, ["motions", "info", str(kinect), "--picture", str(tmp_path / "wave.png")])
     assert result.exit_code == 0, result.output
-    for words in ("40 frames", "30 frames per second", "centimetres", "+y is up", "operator", "upper arm [m]", "0.294"):
+    for words in (
+        "40 frames",
+        "30 frames per second",
+        "centimetres",
+        "+y is up",
+        "operator",
+        "upper arm",
+        "[m/s]",
+        "0.294",
+    ):
         assert words in result.output
     assert (tmp_path / "wave.png").stat().st_size > 5000
 
