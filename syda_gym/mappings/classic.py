@@ -49,7 +49,7 @@ def fit_accurate(jobs: Sequence[FitJob], progress: Progress | None = None) -> li
 
     Robust ridge, and kernel ridge of what the geometric image leaves over, each once on the whole code and once on limb
     directions alone; back to a human robust ridge, kernel ridge and the inverse of ``general``. Options: ``lag``
-    (8), ``confidence`` (true), ``shrinkage`` (0.1), ``gamma`` (0.3), ``kernel_shrinkage`` (3), ``hop_shrinkage`` (10).
+    (8), ``confidence`` (true), ``shrinkage`` (0.1), ``gamma`` (0.3), ``kernel_shrinkage`` (3), ``hop_shrinkage`` (30).
     """
     own = _options(
         jobs,
@@ -59,7 +59,7 @@ def fit_accurate(jobs: Sequence[FitJob], progress: Progress | None = None) -> li
             "shrinkage": 0.1,
             "gamma": 0.3,
             "kernel_shrinkage": 3.0,
-            "hop_shrinkage": 10.0,
+            "hop_shrinkage": 30.0,
         },
     )
 

@@ -20,8 +20,9 @@ from syda_gym.mappings.jobs import FitJob
 from syda_gym.mappings.regressors import DirectRegressor, DualRegressor, Regressor
 from syda_gym.mappings.residual import HopRegressor
 from syda_gym.mappings.scaling import Scaler
+from syda_gym.mappings.settings import TrainingSettings
 from syda_gym.mappings.syda import with_options
-from syda_gym.mappings.training import Job, Progress, TrainingSettings, train
+from syda_gym.mappings.training import Job, Progress, train
 
 __all__ = [
     "GENERAL",
@@ -64,7 +65,7 @@ INTERPOLATION = TrainingSettings(
 """For test poses that come from trained actions: capacity pays there."""
 
 _LAG = 6
-_HOP_SHRINKAGE = 10.0
+_HOP_SHRINKAGE = 30.0
 _ROWS_PER_STEP = 32
 
 
@@ -72,7 +73,7 @@ def fit_general(jobs: Sequence[FitJob], progress: Progress | None = None) -> lis
     """SyDa with shared arms, low capacity, cross losses and lag compensation; between humans a hop.
 
     Options: ``lag`` (largest lag searched for, 6 frames), ``confidence`` (hold actions out for the error bound, true),
-    ``hop_shrinkage`` (10), and the fields of ``TrainingSettings``.
+    ``hop_shrinkage`` (30), and the fields of ``TrainingSettings``.
     """
     return _fit(jobs, GENERAL, "syda", progress)
 

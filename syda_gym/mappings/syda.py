@@ -20,7 +20,8 @@ from syda_gym.mappings.coders import paper_coder
 from syda_gym.mappings.jobs import FitJob
 from syda_gym.mappings.regressors import DualRegressor
 from syda_gym.mappings.scaling import Scaler
-from syda_gym.mappings.training import Job, Progress, TrainingSettings, train
+from syda_gym.mappings.settings import TrainingSettings
+from syda_gym.mappings.training import Job, Progress, train
 
 __all__ = ["HUMAN_WIDTHS", "ROBOT_WIDTHS", "fit_paper", "paper_settings", "with_options"]
 
