@@ -15,7 +15,7 @@ from syda_gym.errors import SydaError
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["app", "console", "main", "print_table", "stages"]
+__all__ = ["app", "console", "main", "print_json", "print_table", "stages"]
 
 app = typer.Typer(
     name="syda-gym",
@@ -30,6 +30,7 @@ MotionsOption = Annotated[
     typer.Option("--motions", "-m", help="`embedded`, `paper:DIR`, `npz:FILE` or another recording.", metavar="SPEC"),
 ]
 OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder to write to; created if need be.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
 
 
@@ -50,6 +51,13 @@ def console(*, stderr: bool = False) -> Console:
     from rich.console import Console
 
     return Console(stderr=stderr)
+
+
+def print_json(value: Any) -> None:
+    """Prints JSON and nothing else, for other programs."""
+    import json
+
+    typer.echo(json.dumps(value, indent=1))
 
 
 def print_table(table: Any, most_columns: int | None = None) -> None:
@@ -234,6 +242,40 @@ def motions_convert(
     console().print(f"written: [bold]{written}[/]")
 
 
+@motions_app.command("pair")
+def motions_pair(
+    operators: Annotated[str, typer.Argument(help="A folder of the operator's recordings, or one file.")],
+    prompts: Annotated[str, typer.Argument(help="What the robot played: `embedded`, `format:PATH`, or a path.")],
+    out: Annotated[Path, typer.Argument(help="Folder of the new data set.")],
+    robot: Annotated[str, typer.Option(help="Whose motions the prompts are.")] = "pepper",
+    max_lag: Annotated[float, typer.Option(help="Largest shift in time either way [s].")] = 1.0,
+    fps: Annotated[float | None, typer.Option(help="Frames per second of the pairs.")] = None,
+    same_clock: Annotated[bool, typer.Option(help="Both have timestamps of one clock.")] = False,
+) -> None:
+    """Pair an operator's recordings with a robot's prompts by name, align them in time, and judge every action."""
+    from rich.table import Table
+
+    from syda_gym.motions import load_motions, operator_clips, pair_session, write_dataset
+
+    played = load_motions(prompts)
+    session = pair_session(
+        operator_clips(operators), played.clips(robot), fps=fps, max_lag=max_lag, same_clock=same_clock, name=out.name
+    )
+    write_dataset(session.motions, out)
+    table = Table("action", "takes", "frames", "lag \\[s]", "correlation", "amplitude", "verdict")
+    for entry in session.quality:
+        numbers = (f"{entry.lag:+.2f}", f"{entry.correlation:.2f}", f"{entry.amplitude:.2f}")
+        table.add_row(entry.action, str(entry.recordings), str(entry.frames), *numbers, entry.verdict)
+    say = console()
+    say.print(table)
+    say.print("lag, correlation and amplitude are those after alignment", style="dim")
+    for recording, found in session.alignments.items():
+        say.print(f"- {recording}: shifted by {found.shift} frames ({found.lag:+.2f} s)", markup=False)
+    for recording, reason in session.left_out.items():
+        say.print(f"- {recording} left out: {reason}", markup=False)
+    say.print(f"written: [bold]{out}[/]")
+
+
 @motions_app.command("formats")
 def motions_formats() -> None:
     """List the formats that can be read."""
@@ -245,6 +287,114 @@ def motions_formats() -> None:
     for entry in FORMATS.values():
         table.add_row(f"{entry.name}:", entry.description, " ".join(entry.endings))
     console().print(table)
+
+
+@app.command()
+def transferability(
+    bodies: Annotated[list[str] | None, typer.Argument(help="Names, URDFs or robot descriptions; all pairs.")] = None,
+    definition: Annotated[str, typer.Option(help="`general` or `paper`.")] = "general",
+    validate: Annotated[bool, typer.Option("--validate", help="Measure whether it predicts held-out errors.")] = False,
+    motions: MotionsOption = "embedded",
+    folds: Annotated[int, typer.Option(help="Groups of actions to hold out (`--validate`).", min=2)] = 4,
+    max_hops: Annotated[int, typer.Option(help="Longest chain (`--validate`).", min=1)] = 3,
+    picture: Annotated[Path | None, typer.Option(help="Write clouds and regions of the first pair as PNG.")] = None,
+    seed: SeedOption = 0,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure how well each body can stand in for each other one, term by term."""
+    from itertools import permutations
+
+    from syda_gym.embodiments import catalog
+    from syda_gym.evaluation.transferability_tables import links_table, prediction_table
+    from syda_gym.files import write_bytes
+    from syda_gym.transferability.metric import transferability as measure
+
+    if validate:
+        from syda_gym.evaluation.prediction import validate as measure_prediction
+
+        with stages({"fit": "Fitting every pair and fold", "chains": "Scoring every chain"}) as tell:
+            study = measure_prediction(
+                motions, bodies=bodies or None, folds=folds, max_hops=max_hops, seed=seed, progress=tell
+            )
+        print_json(study.as_dict()) if as_json else print_table(prediction_table(study))
+        return
+    names = list(bodies or ("adult", "kid", "pepper", "nao"))
+    chosen = [
+        catalog.resolve(name) for name in (names if len(names) > 1 else [*names, "adult", "kid", "pepper", "nao"])
+    ]
+    distinct = list({body.name: body for body in chosen}.values())
+    pairs = list(permutations(distinct, 2))
+    if len(names) == 1:  # one body: how it leads and follows the others
+        pairs = [(a, b) for a, b in pairs if distinct[0] in (a, b)]
+    links = [measure(a, b, definition, seed=seed) for a, b in pairs]  # type: ignore[arg-type]
+    if picture:
+        from syda_gym.transferability.pictures import clouds_png
+
+        write_bytes(picture, clouds_png(*pairs[0], definition, seed=seed))  # type: ignore[arg-type]
+    print_json([link.as_dict() for link in links]) if as_json else print_table(links_table(links))
+
+
+@app.command()
+def route(
+    source: Annotated[str, typer.Option("--from", help="Who leads.")],
+    target: Annotated[str, typer.Option("--to", help="Who follows.")],
+    pairs: Annotated[
+        list[str] | None, typer.Option("--pair", help="A fitted pair `A:B`; may be repeated. Default: all recorded.")
+    ] = None,
+    motions: MotionsOption = "embedded",
+    definition: Annotated[str, typer.Option(help="`general` or `paper`.")] = "general",
+    max_hops: Annotated[int | None, typer.Option(help="Longest chain.", min=1)] = None,
+    predictor: Annotated[str, typer.Option(help="What decides: `T`, `C`, `L`, `coverage`, `hops`, ...")] = "T",
+    count: Annotated[int, typer.Option(help="How many routes to list.", min=1)] = 5,
+    suggest: Annotated[bool, typer.Option("--suggest", help="Also say which pair to record next.")] = False,
+    picture: Annotated[Path | None, typer.Option(help="Write the graph with the chosen route as PNG.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Choose the chain of bodies from one to another that transferability ranks best."""
+    from syda_gym.evaluation.transferability_tables import routes_table, suggestions_table
+    from syda_gym.files import write_bytes
+    from syda_gym.transferability import routing, suggestion
+
+    fitted, bodies = _fitted_pairs(pairs, motions)
+    options: dict[str, Any] = {"max_hops": max_hops, "predictor": predictor}
+    best = routing.best_route(source, target, fitted, definition, **options)  # type: ignore[arg-type]
+    ranked = routing.ranked_routes(source, target, fitted, definition, count=count, **options)  # type: ignore[arg-type]
+    routes = [best, *(other for other in ranked if other.bodies != best.bodies)][:count]
+    further, spanning = None, None
+    if suggest:
+        further = suggestion.suggest(bodies, fitted, definition, **options)[:count]  # type: ignore[arg-type]
+        spanning = suggestion.spanning_pairs(bodies, (), definition, predictor=predictor)  # type: ignore[arg-type]
+    if picture:
+        from syda_gym.transferability.pictures import graph_png
+
+        graph = routing.BodyGraph((), fitted, definition, predictor=predictor)  # type: ignore[arg-type]
+        write_bytes(picture, graph_png(graph, best))
+    if as_json:
+        print_json({
+            "routes": [item.as_dict() for item in routes],
+            "suggestions": [{"pair": s.pair, "gain": s.gain, "sum": s.total} for s in further or ()],
+            "spanning": spanning.pairs if spanning else [],
+        })  # fmt: skip
+        return
+    print_table(routes_table(routes, predictor))
+    if further is not None:
+        print_table(suggestions_table(further, spanning))
+
+
+def _fitted_pairs(pairs: list[str] | None, motions: str) -> tuple[list[tuple[Any, Any]], list[Any]]:
+    """Pairs as the user named them, or all that were recorded together; and everybody who can be paired."""
+    from syda_gym.errors import OptionError
+    from syda_gym.motions.loading import load_motions
+
+    if not pairs:
+        recorded = load_motions(motions)
+        fitted = [(recorded.bodies[a], recorded.bodies[b]) for a, b in recorded.pairs]
+        return fitted, list(recorded.bodies.values())
+    for pair in pairs:
+        if pair.count(":") != 1:
+            raise OptionError(f"--pair takes two bodies as A:B, for example adult:kid; got {pair!r}")
+    named = [(pair.split(":")[0], pair.split(":")[1]) for pair in pairs]
+    return named, list(dict.fromkeys(name for pair in named for name in pair))
 
 
 def _command() -> str:

@@ -10,6 +10,7 @@ from syda_gym.motions.picture import draw_clips
 from syda_gym.motions.readers.npz import save_motions
 from syda_gym.motions.readers.skeleton import MotionWarning
 from syda_gym.motions.resampling import resampled
+from syda_gym.motions.session import Session, operator_clips, pair_session
 from syda_gym.motions.synthetic import generate
 from syda_gym.motions.validation import Finding, validate_dataset
 
@@ -25,6 +26,7 @@ __all__ = [
     "MotionsInfo",
     "PairedClip",
     "PairedMotions",
+    "Session",
     "Take",
     "align",
     "conformed",
@@ -32,8 +34,10 @@ __all__ = [
     "draw_clips",
     "generate",
     "load_motions",
+    "operator_clips",
     "pair_quality",
     "pair_recordings",
+    "pair_session",
     "read_dataset",
     "resampled",
     "save_motions",
