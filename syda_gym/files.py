@@ -13,7 +13,7 @@ from typing import Any
 
 from syda_gym.errors import StorageError
 
-__all__ = ["asset", "atomic_path", "fingerprint", "read_json", "write_json", "write_text"]
+__all__ = ["asset", "atomic_path", "fingerprint", "read_json", "write_bytes", "write_json", "write_text"]
 
 ASSETS = Path(__file__).parent / "assets"
 
@@ -58,6 +58,13 @@ def write_text(path: str | os.PathLike[str], text: str) -> Path:
     """Writes UTF-8 text atomically and returns the path."""
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+    return Path(path)
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> Path:
+    """Writes bytes atomically, for example a picture, and returns the path."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(data)
     return Path(path)
 
 

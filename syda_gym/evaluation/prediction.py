@@ -307,27 +307,20 @@ def _results(
     for route, metres in errors.items():
         steps = list(zip(route[:-1], route[1:], strict=True))
         general = [links["general"][step] for step in steps]
-        whole = links["general"][route[0], route[-1]]
-        predicted = {
-            "T": np.prod([link.T for link in general]),
-            "T_with_noise_alpha": np.prod(
-                [link.T * alpha[frozenset(step)] for link, step in zip(general, steps, strict=True)]
-            ),
-            "paper_T": np.prod([links["paper"][step].T for step in steps]),
-            "C": np.prod([link.C for link in general]),
-            "L": np.prod([link.L for link in general]),
-            "coverage": np.prod([link.coverage for link in general]),
-            "symmetric_C": np.prod(
-                [link.C * links["general"][b, a].C for link, (a, b) in zip(general, steps, strict=True)]
-            ),
-            "noise_alpha": np.prod([alpha[frozenset(step)] for step in steps]),
-            "arm_length_ratio": whole.L,
-            "hops": -float(len(steps)),
-            "training_error": -sum(training[step] for step in steps),
+        back = [links["general"][b, a] for a, b in steps]
+        products = {
+            "T": [link.T for link in general],
+            "T_with_noise_alpha": [link.T * alpha[frozenset(step)] for link, step in zip(general, steps, strict=True)],
+            "paper_T": [links["paper"][step].T for step in steps],
+            "C": [link.C for link in general],
+            "L": [link.L for link in general],
+            "coverage": [link.coverage for link in general],
+            "C_both_ways": [link.C * other.C for link, other in zip(general, back, strict=True)],
+            "noise_alpha": [alpha[frozenset(step)] for step in steps],
         }
-        results.append(
-            RouteResult(
-                route, metres / bodies[route[-1]].reach, metres, {name: float(v) for name, v in predicted.items()}
-            )
-        )
+        predicted = {name: float(np.prod(values)) for name, values in products.items()}
+        predicted["arm_length_ratio"] = links["general"][route[0], route[-1]].L
+        predicted["hops"] = -float(len(steps))
+        predicted["training_error"] = -sum(training[step] for step in steps)
+        results.append(RouteResult(route, metres / bodies[route[-1]].reach, metres, predicted))
     return tuple(results)

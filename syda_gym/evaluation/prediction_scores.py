@@ -57,7 +57,7 @@ def score_predictors(
         seed: of the bootstrap.
         resamples: bootstrap samples.
     """
-    ends = np.array([hash_of for hash_of in _labels(routes)])
+    ends = np.array(_labels(routes))
     groups = [np.flatnonzero(ends == label) for label in range(ends.max() + 1)]
     rng = np.random.default_rng(seed)
     draws = [rng.integers(0, len(groups), len(groups)) for _ in range(resamples)]
@@ -88,10 +88,9 @@ def _labels(routes: Sequence[RouteResult]) -> list[int]:
 
 def _bootstrap(predicted: FloatArray, wanted: FloatArray, groups: list[Any], draws: list[Any]) -> Estimate:
     rows = np.concatenate(groups)
-    values = [
-        _rank(predicted[pick], wanted[pick]) for draw in draws if len(pick := np.concatenate([groups[i] for i in draw]))
-    ]
-    return _estimate(_rank(predicted[rows], wanted[rows]), np.array(values), len(rows))
+    picks = (np.concatenate([groups[i] for i in draw]) for draw in draws)
+    values = np.array([_rank(predicted[pick], wanted[pick]) for pick in picks])
+    return _estimate(_rank(predicted[rows], wanted[rows]), values, len(rows))
 
 
 def _mean_over(values: FloatArray, draws: list[Any]) -> Estimate:
