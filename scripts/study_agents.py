@@ -54,13 +54,13 @@ class Size:
     """How much of everything; ``small`` is for trying the script."""
 
     variants: int = 8
-    episodes: int = 576
-    tuning_episodes: int = 72
-    validation_episodes: int = 60
-    budget: int = 24
-    iterations: int = 600
-    steps: int = 250_000
-    test_variants: int = 3
+    episodes: int = 400
+    tuning_episodes: int = 40
+    validation_episodes: int = 40
+    budget: int = 20
+    iterations: int = 320
+    steps: int = 200_000
+    test_variants: int = 2
 
 
 SIZES = {"full": Size(), "small": Size(1, 48, 12, 8, 3, 24, 20_000, 1)}

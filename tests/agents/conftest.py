@@ -48,3 +48,24 @@ def make_streams(variants: int, *, noise: float, latency: int, seed: int, action
 @pytest.fixture(scope="session")
 def noisy_streams() -> tuple[Streams, Streams]:
     return make_streams(3, noise=0.04, latency=0, seed=1), make_streams(1, noise=0.04, latency=0, seed=2)
+
+
+@pytest.fixture(scope="session")
+def tiny_options():
+    """Options of a cheap environment: few clips, a mapping that is fitted in a moment."""
+    motions = generate(("adult", "pepper"), seed=4, actions=("wave_high", "reach_high_front"), variants=2)
+    return {
+        "motions": motions,
+        "mapping": "ridge",
+        "route": ("adult", "pepper"),
+        "physics": "servo",
+        "physics_hz": 60.0,
+        "disturbances": "teleop:full:train",
+    }
+
+
+@pytest.fixture(scope="session")
+def ground(tiny_options):
+    from syda_gym.agents.recording import Ground
+
+    return Ground(tiny_options)

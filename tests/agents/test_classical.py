@@ -12,21 +12,7 @@ from syda_gym.embodiments import catalog
 from syda_gym.errors import AgentError
 
 DT = 1 / 30
-GAIN, SUBSTEPS = 0.1, 8
-ALPHA = 1 - (1 - GAIN) ** SUBSTEPS
-
-
-@pytest.fixture(scope="module")
-def interface() -> Interface:
-    robot = catalog.get("pepper")
-    n = len(robot.joint_names)
-    layout = {
-        "base_error": slice(0, n),
-        "q": slice(n, 2 * n),
-        "qd": slice(2 * n, 3 * n),
-        "packet_age": slice(3 * n, 3 * n + 1),
-    }
-    return Interface(robot, layout, 3 * n + 1, DT, ALPHA)
+ALPHA = 1 - 0.9**8  # eight physics steps at 240 Hz, whatever the physics rate
 
 
 def observe(base, q, age=0.0):

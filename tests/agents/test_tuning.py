@@ -9,10 +9,9 @@ from syda_gym.agents.figures import Figures, episode_figures, mean_figures
 from syda_gym.agents.tuning import tune
 from syda_gym.embodiments import catalog
 from syda_gym.errors import AgentError
-from tests.agents.test_classical import interface  # noqa: F401  (a fixture)
 
 
-def test_tune_finds_the_minimum_of_a_known_objective(interface):  # noqa: F811
+def test_tune_finds_the_minimum_of_a_known_objective(interface):
     target = {"process": 40.0, "horizon": 0.2, "strength": 0.7}
 
     def score(agent):
@@ -32,7 +31,7 @@ def test_tune_finds_the_minimum_of_a_known_objective(interface):  # noqa: F811
     assert tune("kalman", interface, score, budget=8, seed=3).figures.objective > best.figures.objective
 
 
-def test_a_rival_without_settings_is_played_once(interface):  # noqa: F811
+def test_a_rival_without_settings_is_played_once(interface):
     played = []
 
     def score(agent):
@@ -43,7 +42,7 @@ def test_a_rival_without_settings_is_played_once(interface):  # noqa: F811
     assert len(played) == 1
 
 
-def test_bad_requests(interface):  # noqa: F811
+def test_bad_requests(interface):
     with pytest.raises(AgentError, match="did you mean 'one_euro'"):
         tune("one_eur", interface, lambda agent: Figures(0, 0, 0))
     with pytest.raises(AgentError, match="budget"):
