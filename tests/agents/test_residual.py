@@ -72,7 +72,7 @@ def test_the_training_environment_plays_a_policy_as_the_agent_itself_does(ground
     streams = ground.record(3, seed=5)
     interface = ground.interface
     for name in ("base", "kalman"):
-        policy = random_policy(interface, make_rival(name, interface), size=0.2, smoothing=0.5)
+        policy = random_policy(interface, make_rival(name, interface), size=0.03, smoothing=0.5)
         expected = play_streams(policy, streams, ground.rates)
         env = ResidualVecEnv(
             make_rival(name, interface), make_rival(name, interface), streams, ground.rates,
