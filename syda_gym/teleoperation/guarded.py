@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.embodiment import Embodiment, FloatArray
+from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import SydaError, TeleoperationError
 from syda_gym.mappings.chain import ChainMapping
@@ -17,7 +18,7 @@ __all__ = ["GuardedMapping", "Mapped"]
 
 
 class Mapped(NamedTuple):
-    """One mapped frame: joint angles ``(n,)`` [rad], error bound [m] (infinite if unknown), out of distribution."""
+    """One mapped frame: joint angles ``(n,)`` [rad], error bound [m] (NaN if unknown), out of distribution."""
 
     angles: FloatArray
     bound: float
@@ -33,10 +34,11 @@ class GuardedMapping:
         mapping: ends at a robot.
 
     Attributes:
+        bounded: whether the mapping knows an error bound.
         notices: what the mapping cannot tell, for the screen.
 
     Raises:
-        TeleoperationError: the mapping does not end at a robot.
+        TeleoperationError: the mapping does not end at a robot, or fails on the most ordinary frame.
     """
 
     def __init__(self, mapping: Mapping) -> None:
@@ -48,9 +50,13 @@ class GuardedMapping:
         self.robot: Robot = mapping.target
         self.links = mapping.links if isinstance(mapping, ChainMapping) else (mapping,)
         self.notices: list[str] = []
-        self._bounded = self._knows("error_bound", "no error bound: the robot is not slowed by it")
+        self.bounded = self._knows("error_bound", "no error bound: the robot is not slowed by it")
         self._familiar = self._knows("unfamiliar", "no familiarity: unusual poses are not slowed")
         self._gains = [_gain(link) for link in self.links]
+        try:
+            self(_usual(mapping.source))
+        except (SydaError, ArithmeticError, ValueError) as error:
+            raise TeleoperationError(f"{mapping!r} cannot map a person who stands still: {error}") from error
 
     def __call__(self, frame: FloatArray) -> Mapped:
         """Maps one frame ``(F,)`` of the mapping's source.
@@ -60,13 +66,13 @@ class GuardedMapping:
         """
         current, bound, unfamiliar = frame, 0.0, False
         for link, gain in zip(self.links, self._gains, strict=True):
-            if self._bounded:
+            if self.bounded:
                 bound = bound * gain + float(link.error_bound(current)[0])
             current, odd = self._through(link, current)
             unfamiliar = unfamiliar or odd
         if not np.isfinite(current).all():
             raise TeleoperationError(f"{self.mapping!r} gave joint angles that are not finite")
-        return Mapped(current, bound, unfamiliar)
+        return Mapped(current, bound if self.bounded else float("nan"), unfamiliar)
 
     def _through(self, link: Mapping, frame: FloatArray) -> tuple[FloatArray, bool]:
         """One link's image of a frame and whether the frame was unfamiliar to it."""
@@ -82,15 +88,24 @@ class GuardedMapping:
     def _knows(self, question: str, notice: str) -> bool:
         """Whether every link answers; links that were fitted on too little, or not fitted at all, do not."""
         for link in self.links:
-            probe = link.source.rest if isinstance(link.source, Robot) else link.source.standing()  # type: ignore[attr-defined]
             try:
-                answer = getattr(link, question)(probe)
+                answer = getattr(link, question)(_usual(link.source))
             except SydaError:
                 answer = np.array([np.nan])
             if not np.isfinite(answer).all():
                 self.notices.append(f"{' > '.join(link.route)}: {notice}")
                 return False
         return True
+
+
+def _usual(body: Embodiment) -> FloatArray:
+    """A frame ``(F,)`` that every body can take: a robot at rest, a person standing."""
+    if isinstance(body, Robot):
+        rest: FloatArray = body.rest
+        return rest
+    if isinstance(body, HumanSkeleton):
+        return body.standing()
+    return np.zeros(body.n_features)
 
 
 def _gain(link: Mapping) -> float:

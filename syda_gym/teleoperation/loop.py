@@ -163,7 +163,7 @@ class TeleoperationLoop:
         except (SydaError, ArithmeticError, ValueError) as error:  # a robot in motion must survive any mapping
             reasons.append(f"mapping: {' '.join(str(error).split())[:200] or type(error).__name__}")
             return float("nan"), False
-        trust = self._policy.factor(mapped.bound, tick.tracking)
+        trust = self._policy.factor(mapped.bound if self._guarded.bounded else 0.0, tick.tracking)
         if trust == 0.0:
             reasons.append("confidence: held")
             self._trust = 0.0

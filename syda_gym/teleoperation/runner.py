@@ -32,7 +32,8 @@ def run(
     """Runs until the source ends, the time is over, or a KeyboardInterrupt; then eases to rest.
 
     A frame is acted on when it arrives; while none arrives the loop decides ``settings.rate`` times a second all the
-    same. The source and the sink must be started and open; the source's clock is the loop's.
+    same. The source and the sink must be started and open, the sink first (it may take a second, in
+    which a recording would already play); the source's clock is the loop's.
 
     Args:
         source: where frames come from.

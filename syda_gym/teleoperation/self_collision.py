@@ -121,24 +121,37 @@ class SelfCollision:
         return not any(self.touches(start + (end - start) * (i / count)) for i in range(count, 0, -1))
 
     def allowed(self, start: FloatArray, end: FloatArray) -> FloatArray:
-        """The part of a step that stays free: all of it, one arm of it, or none.
+        """The part of a step that stays free: all of it, or arm by arm and joint by joint what can still move.
+
+        So an arm that meets the body slides along it rather than sticking to it.
 
         Args:
             start: the last command ``(n,)`` [rad], free.
             end: the next command ``(n,)`` [rad].
 
         Returns:
-            ``end``, ``end`` with the arm that would collide left at ``start``, or ``start``.
+            ``end`` itself, or a new array between ``start`` and ``end``.
         """
         if self.free_path(start, end):
             return end
-        if len(self.robot.arm_slices) > 1:
-            for part in self.robot.arm_slices:
-                one = start.copy()
-                one[part] = end[part]
-                if self.free_path(start, one):
-                    return one
-        return start
+        result = start.copy()
+        for part in self.robot.arm_slices:
+            if self._try(result, end, part):
+                continue
+            for joint in range(part.start, part.stop):
+                self._try(result, end, slice(joint, joint + 1))
+        return result
+
+    def _try(self, pose: FloatArray, end: FloatArray, part: slice) -> bool:
+        """Moves part of a pose to ``end`` if the way is free."""
+        if (pose[part] == end[part]).all():
+            return True
+        moved = pose.copy()
+        moved[part] = end[part]
+        if not self.free_path(pose, moved):
+            return False
+        pose[part] = end[part]
+        return True
 
     def _full(self, angles: FloatArray) -> FloatArray:
         self._configuration[self._index] = angles
