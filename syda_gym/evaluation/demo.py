@@ -162,7 +162,11 @@ def run_demo(
         from syda_gym.evaluation.demo_residual import train_and_compare
 
         with clock("residual"):
-            learned = train_and_compare(data, chosen[operators[0]].bodies, seed, lambda done: tell("residual", done))
+            route = chosen[operators[0]].bodies
+            apart = groups[0] if len(groups) == 1 else _third(data.pair(route[0], route[-1]).action_names, seed)
+            learned = train_and_compare(
+                data, route, apart, seed, folder=folder, progress=lambda done: tell("residual", done)
+            )
     result = DemoResult(
         data, driven, tuple(groups), links, paper_links, chosen, tuple(chains), fitted.count(), learned,
         clock.seconds, seed,
@@ -232,6 +236,12 @@ def _groups(motions: Motions, operator: str, robot: str, seed: int) -> list[tupl
     order = [families[i] for i in rng.permutation(len(families))]
     picked = [by_family[family][0] for family in order][: len(names) // 5]
     return [tuple(sorted(picked))]
+
+
+def _third(actions: Sequence[str], seed: int) -> tuple[str, ...]:
+    """A third of the actions, which the policy's training leaves out."""
+    picked = np.random.default_rng(seed).permutation(len(actions))[: max(1, len(actions) // 3)]
+    return tuple(sorted(actions[i] for i in picked))
 
 
 def _edges(route: Sequence[str]) -> list[tuple[str, str]]:
