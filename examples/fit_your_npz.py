@@ -3,7 +3,8 @@
     python examples/fit_your_npz.py [FILE.npz]
 
 FILE.npz holds ``adult`` (N, 18), landmark positions in metres; ``pepper`` (N, 10), joint angles in radians; and
-``actions`` (N,), the name of what is done in each row. Without an argument such a file is made from the synthetic motions.
+``actions`` (N,), the name of what is done in each row. Without an argument such a file is made from the synthetic
+motions.
 """
 
 import sys
@@ -32,9 +33,9 @@ with np.load(file, allow_pickle=False) as arrays:
 train, test = next(pair.folds("loao"))  # one action is left out
 mapping = syda_gym.fit(train, method="syda", preset="general", seed=0)
 error = syda_gym.landmark_error(pair.target_body, mapping(test.source), test.target)
-print(
-    f"{pair}\nunseen action {test.action_names[0]!r}: {error.mean():.4f} m; bound {mapping.error_bound(test.source).mean():.4f} m"
-)
+bound = mapping.error_bound(test.source)
+print(pair)
+print(f"unseen action {test.action_names[0]!r}: {error.mean():.4f} m; predicted bound {bound.mean():.4f} m")
 
 syda_gym.save_mapping(mapping, "adult_to_pepper")  # adult_to_pepper.safetensors and its card adult_to_pepper.json
 again = syda_gym.load_mapping("adult_to_pepper")

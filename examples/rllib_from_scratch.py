@@ -1,4 +1,4 @@
-"""Train with Ray RLlib, which pins a Gymnasium of its own (1.2), so it wants an environment of its own:
+"""Train with Ray RLlib, which pins a Gymnasium of its own (1.2) and so wants a virtual environment of its own.
 
 python3.11 -m venv rllib-venv
 rllib-venv/bin/pip install . "ray[rllib]" torch

@@ -1,4 +1,4 @@
-"""Draws the moving picture of the README: an operator, the kid of the chain, and Pepper, on an action that was not fitted.
+"""Draws the moving picture of the README: operator, kid and Pepper in a row, on an action that was not fitted.
 
 python scripts/build_images.py [--action NAME] [--out docs/images/chain.webp]
 """
