@@ -144,7 +144,7 @@ app.add_typer(motions_app, name="motions")
 
 
 @motions_app.command("info")
-def motions_info(
+def _motions_info(
     spec: Annotated[str, typer.Argument(help="`embedded`, `format:PATH`, or a path.", metavar="SPEC")],
     picture: Annotated[Path | None, typer.Option(help="PNG to draw stick figures into.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
@@ -200,7 +200,7 @@ def motions_info(
 
 
 @motions_app.command("check")
-def motions_check(
+def _motions_check(
     folder: Annotated[Path, typer.Argument(help="A data set folder with `dataset.json`.")],
 ) -> None:
     """Check a paired data set: every fault with its place, and how well each action pairs up."""
@@ -219,7 +219,7 @@ def motions_check(
 
 
 @motions_app.command("convert")
-def motions_convert(
+def _motions_convert(
     spec: Annotated[str, typer.Argument(help="`embedded`, `format:PATH`, or a path.", metavar="SPEC")],
     out: Annotated[Path, typer.Argument(help="An `.npz` file, or a folder for a data set.")],
     fps: Annotated[float | None, typer.Option(help="Resample to this rate.")] = None,
@@ -243,7 +243,7 @@ def motions_convert(
 
 
 @motions_app.command("pair")
-def motions_pair(
+def _motions_pair(
     operators: Annotated[str, typer.Argument(help="A folder of the operator's recordings, or one file.")],
     prompts: Annotated[str, typer.Argument(help="What the robot played: `embedded`, `format:PATH`, or a path.")],
     out: Annotated[Path, typer.Argument(help="Folder of the new data set.")],
@@ -277,7 +277,7 @@ def motions_pair(
 
 
 @motions_app.command("formats")
-def motions_formats() -> None:
+def _motions_formats() -> None:
     """List the formats that can be read."""
     from rich.table import Table
 

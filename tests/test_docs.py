@@ -157,7 +157,8 @@ def parse_with_cli(words: list[str]) -> None:
     # Placeholders such as FILE or DIR stand for paths that need not exist here.
     context = command.make_context("syda-gym", list(words), resilient_parsing=False) if words else None
     while context is not None and getattr(context.command, "commands", None):
-        rest = [*context.protected_args, *context.args] if hasattr(context, "protected_args") else context.args
+        protected = getattr(context, "protected_args", None) or getattr(context, "_protected_args", [])
+        rest = [*protected, *context.args]
         if not rest:
             return
         label, sub, tail = context.command.resolve_command(context, rest)
