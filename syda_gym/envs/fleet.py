@@ -19,7 +19,7 @@ from syda_gym.envs.options import TeleopOptions
 from syda_gym.envs.repertoire import Repertoire
 from syda_gym.envs.scripts import Scripts
 from syda_gym.envs.starts import StartSampler
-from syda_gym.envs.tracking import TERMS, reward_terms
+from syda_gym.envs.tracking import TERMS, in_order, reward_terms
 from syda_gym.errors import OptionError
 from syda_gym.simulation.backend import MotorConditions, make_world
 
@@ -87,8 +87,6 @@ class Fleet:
         low, high = self.robot.limits_at(samples)
         self._safe_lower, self._safe_upper = low.max(axis=0), high.min(axis=0)
         points = 2 * len(self.robot.sides)
-        # One reduction over [joint errors | landmark errors | third differences].
-        self._cuts = np.r_[0, n + 3 * np.arange(2 * points)].astype(np.intp)
         self._points = points
         self.world = self._new_world()
         # Commands of the present episodes: what a pickled Bullet world is led back by.
@@ -164,7 +162,7 @@ class Fleet:
         error = pose - target
         self._target[rows], self._error[rows] = target, error
         points = error[:, self._n :].reshape(len(rows), -1, 3)
-        self._distances[rows, : self._points] = np.sqrt(np.add.reduce(points * points, axis=2))
+        self._distances[rows, : self._points] = np.sqrt(in_order(points * points))
         self._distances[rows, self._points :] = 0.0
 
     def step(self, actions: ArrayLike, skip: NDArray[np.bool_] | None = None) -> None:
@@ -200,31 +198,31 @@ class Fleet:
         trail = self._trail
         first = landmarks - trail[0]
         second = first - trail[1]
-        squares = np.empty((self.count, n + 6 * points))
-        squares[:, : n + 3 * points] = error
-        np.subtract(second, trail[2], out=squares[:, n + 3 * points :])
+        squares = np.empty((self.count, 2 * points, 3))
+        squares[:, :points] = error[:, n:].reshape(self.count, points, 3)
+        squares[:, points:] = (second - trail[2]).reshape(self.count, points, 3)
         self._trail = [landmarks, first, second]
         squares *= squares
-        sums = np.add.reduceat(squares, self._cuts, axis=1)
-        self._distances = distances = np.sqrt(sums[:, 1:])
-        means = np.add.reduce(distances.reshape(self.count, 2, points), axis=2) / points
-        self._jitter = means[:, 1]
+        self._distances = distances = np.sqrt(in_order(squares))
+        joints = error[:, :n]
+        mean, jitter = in_order(distances[:, :points]) / points, in_order(distances[:, points:]) / points
+        self._jitter = jitter
         self._terms = terms = reward_terms(
             self._weights,
-            squared_joint_error=sums[:, 0],
-            landmark_error=means[:, 0],
-            correction_change=np.add.reduce(change * change, axis=1) / n,
+            squared_joint_error=in_order(joints * joints),
+            landmark_error=mean,
+            correction_change=in_order(change * change) / n,
             limit_hits=self._hits,
             contacts=self.world.contacts,
-            jitter=means[:, 1],
+            jitter=jitter,
         )
-        self.reward = np.add.reduce(terms, axis=0)
+        self.reward = in_order(terms.T)
         self._action, self._correction, self._command = action, correction, command
-        self._error_sum = self._error_sum + means[:, 0]
+        self._error_sum = self._error_sum + mean
         self._k = k = k + 1
         self.truncated = k >= self._length
         if options.terminate_error is not None:
-            self.terminated = means[:, 0] > options.terminate_error
+            self.terminated = mean > options.terminate_error
         if self.truncated.any() or self.terminated.any():
             self._finish(self.done if skip is None else self.done & ~skip)
 

@@ -45,6 +45,7 @@ class Scripts:
         self._base_at = np.zeros(count, dtype=np.intp)
         self._operator_at = np.zeros(count, dtype=np.intp)
         self._known_routes: list[int] = []
+        self._reader = (0, 0, 0)
         n = len(repertoire.robot.joint_names)
         width = (self._preview + 1) * n
         if self._disturbances is None:
@@ -114,6 +115,29 @@ class Scripts:
     def age_of_all(self, k: Rows) -> FloatArray:
         """Ages of the newest packets, ``(B,)`` [s]."""
         return self._ages if self._disturbances is None else np.asarray(self._age_rows[self._base_at + k])
+
+    def turn_to(self, index: int) -> None:
+        """Chooses the robot that the methods for single rows read for."""
+        self._reader = (int(self._operator_at[index]), int(self._base_at[index]), int(self._target_at[index]))
+
+    def operator_row(self, k: int) -> list[float]:
+        """Operator frame of the newest packet, ``F`` numbers."""
+        row: list[float] = self._operator_rows[self._reader[0] + k].tolist()
+        return row
+
+    def base_row(self, k: int) -> list[float]:
+        """Base commands with their preview."""
+        row: list[float] = self._base_rows[self._reader[1] + k].tolist()
+        return row
+
+    def target_row(self, k: int) -> list[float]:
+        """What the robot should do: joint angles and landmark coordinates."""
+        row: list[float] = self._target_rows[self._reader[2] + k].tolist()
+        return row
+
+    def age(self, k: int) -> float:
+        """Age of the newest packet [s]."""
+        return 0.0 if self._disturbances is None else float(self._age_rows[self._reader[1] + k])
 
     def _frozen_targets(self, reference: str) -> FloatArray:
         repertoire, n = self._repertoire, len(self._repertoire.robot.joint_names)

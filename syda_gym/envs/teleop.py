@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.envs.face import Face
-from syda_gym.envs.fleet import Fleet
 from syda_gym.envs.options import TeleopOptions
 from syda_gym.envs.rendering import Painter
-from syda_gym.envs.spaces import action_from_command, action_space, one_info, wishes
+from syda_gym.envs.solo import Solo
+from syda_gym.envs.spaces import action_from_command, action_space, wishes
 from syda_gym.errors import OptionError, SydaError
 from syda_gym.simulation.camera import CameraView, Picture
 from syda_gym.simulation.window import has_display
@@ -28,6 +28,7 @@ Action = NDArray[np.float32]
 class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     """Replays an operator's motion on a robot; an agent corrects what the mapping asks for."""
 
+    _fleet: Solo
     metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": 30}  # noqa: RUF012
 
     def __init__(
@@ -43,7 +44,7 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
             )
         self.options = TeleopOptions.of(options, changes)
         self.render_mode = render_mode
-        self._fleet = Fleet(self.options, 1)
+        self._fleet = Solo(self.options)
         self.metadata = {
             # Without a display, 'human' is not offered, so that tools which try every mode leave it alone.
             "render_modes": [mode for mode in type(self).metadata["render_modes"] if mode != "human" or has_display()],
@@ -64,7 +65,9 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
         Returns:
             ``(n,)``, within the action space.
         """
-        return action_from_command(self.options, self.robot, np.asarray(command, dtype=np.float64), self._fleet.base[0])
+        return action_from_command(
+            self.options, self.robot, np.asarray(command, dtype=np.float64), self._fleet.present_base
+        )
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -81,13 +84,12 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
         """
         super().reset(seed=seed)
         wish = wishes(self._fleet.repertoire, options, 1)
-        self._fleet.reset([0], [self.np_random], wish)
+        observation, info = self._fleet.begin(self.np_random, wish[0])
         self._started = True
-        observation = self._fleet.observe()[0]
         if self.render_mode in ("human", "rgb_array_list"):
             self._pictures.clear()
             self._draw()
-        return observation, self._info()
+        return observation, info
 
     def step(self, action: Action) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
         """One control step.
@@ -101,12 +103,10 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
         """
         if not self._started:
             raise SydaError("step was called before reset; call reset first")
-        fleet = self._fleet
-        fleet.step(np.asarray(action)[None])
-        observation = fleet.observe()[0]
+        result = self._fleet.play(action)
         if self.render_mode in ("human", "rgb_array_list"):
             self._draw()
-        return observation, float(fleet.reward[0]), bool(fleet.terminated[0]), bool(fleet.truncated[0]), self._info()
+        return result
 
     def render(self) -> Any:
         """What the render mode asks for.
@@ -140,6 +140,3 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
             self._painter.show(self._fleet)
         else:
             self._pictures.append(self._painter.picture(self._fleet))
-
-    def _info(self) -> dict[str, Any]:
-        return one_info(self._fleet.info(), self._fleet.names(0), 0)

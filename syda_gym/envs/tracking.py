@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import OptionError, nearest_name
 
-__all__ = ["TERMS", "RewardWeights", "reward_terms"]
+__all__ = ["TERMS", "RewardWeights", "in_order", "reward_terms"]
 
 TERMS = ("joints", "landmarks", "correction_change", "limits", "contacts", "jitter")
 """Names of the reward terms, in the order of the columns of ``reward_terms``."""
@@ -71,6 +71,17 @@ class RewardWeights:
             if name not in known:
                 raise OptionError(f"unknown reward weight {name!r}; {nearest_name(str(name), known)}")
         return cls(**value)
+
+
+def in_order(values: FloatArray) -> FloatArray:
+    """Sum over the last axis, from the first entry to the last.
+
+    numpy's own sum chooses its order by shape and strides; this one gives the same bits for one robot and for many.
+    """
+    total = values[..., 0] + values[..., 1]
+    for index in range(2, values.shape[-1]):
+        total = total + values[..., index]
+    return np.asarray(total)
 
 
 def closeness(distance: FloatArray, sharpness: float) -> FloatArray:

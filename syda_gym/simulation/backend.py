@@ -67,6 +67,9 @@ class Backend(Protocol):
     def advance(self, commands: FloatArray) -> None:
         """Lets every robot follow its command ``(B, n)`` [rad] for one control step; new state arrays result."""
 
+    def advance_one(self, command: list[float]) -> list[float]:
+        """``advance`` for a world of one robot; joint angles, landmark coordinates and joint speeds in one list."""
+
     def close(self) -> None:
         """Releases what the world holds; harmless when repeated."""
 

@@ -110,6 +110,12 @@ class ServoWorld:
         self._stop_at_limits()
         self._show()
 
+    def advance_one(self, command: list[float]) -> list[float]:
+        """``advance`` for a world of one robot: joint angles, landmark coordinates and joint speeds afterwards."""
+        self.advance(np.array([command]))
+        row: list[float] = self.pose[0].tolist() + self.qd[0].tolist()
+        return row
+
     def close(self) -> None:
         """Nothing to release."""
 

@@ -114,6 +114,25 @@ class World:
         if self.self_collision:
             self.contacts = np.array([puppet.contacts() for puppet in self._puppets], dtype=np.int64)
 
+    def advance_one(self, command: list[float]) -> list[float]:
+        """``advance`` for a world of one robot, without arrays on the way.
+
+        Returns:
+            Joint angles, landmark coordinates and joint speeds.
+        """
+        puppet = self._puppets[0]
+        puppet.command(command)
+        step, client = self._bullet.stepSimulation, self._clients[0]
+        for _ in range(self.rates.substeps):
+            step(client)
+        row = puppet.read()
+        state = np.array([row])
+        split = len(row) - len(command)
+        self.pose, self.qd = state[:, :split], state[:, split:]
+        if self.self_collision:
+            self.contacts = np.array([puppet.contacts()], dtype=np.int64)
+        return row
+
     def close(self) -> None:
         """Disconnects; an unclosed client costs 28 MB."""
         clients, self._clients, self._puppets = self._clients, [], []
