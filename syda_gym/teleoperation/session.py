@@ -1,0 +1,110 @@
+"""teleoperate: everything between a user's words and a moving robot, in one call."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.errors import OptionError
+from syda_gym.mappings.mapping import Mapping
+from syda_gym.teleoperation.addresses import make_sink, make_source
+from syda_gym.teleoperation.journal import Journal
+from syda_gym.teleoperation.loop import TeleoperationLoop
+from syda_gym.teleoperation.runner import run
+from syda_gym.teleoperation.sinks import Sink
+from syda_gym.teleoperation.sources import Source
+from syda_gym.teleoperation.statistics import LiveStatistics
+from syda_gym.teleoperation.tick import Decision, LoopSettings
+
+__all__ = ["Session", "teleoperate"]
+
+
+@dataclass(frozen=True)
+class Session:
+    """What a run is made of; handed to ``on_start``."""
+
+    loop: TeleoperationLoop
+    source: Source
+    sink: Sink
+    statistics: LiveStatistics
+
+
+def teleoperate(
+    mapping: Mapping,
+    source: str | Source = "replay:embedded",
+    sinks: Sequence[str] | Sink = ("bullet",),
+    *,
+    settings: LoopSettings | None = None,
+    token: str | None = None,
+    speed: float = 1.0,
+    actions: Sequence[str] = (),
+    repeat: bool = False,
+    origins: tuple[str, ...] = (),
+    journal: str | os.PathLike[str] | None = None,
+    note: dict[str, Any] | None = None,
+    seconds: float | None = None,
+    on_start: Callable[[Session], None] | None = None,
+    on_decision: Callable[[Decision], None] | None = None,
+) -> LiveStatistics:
+    """Drives a robot live until the source ends, the time is over, or the user interrupts.
+
+    Args:
+        mapping: from the operator's body to the robot.
+        source: an address (see ``addresses.SOURCES``) or a source that is not started yet.
+        sinks: addresses (see ``addresses.SINKS``) or a sink that is not open yet.
+        settings: of the loop.
+        token: secret for addresses beyond this machine.
+        speed: of a replay.
+        actions: that a replay plays.
+        repeat: whether a replay begins again.
+        origins: web pages that may connect to a WebSocket.
+        journal: file to write every decision to.
+        note: free facts for the journal.
+        seconds: when to end.
+        on_start: called once everything is there and before frames flow.
+        on_decision: called after each command.
+
+    Returns:
+        The statistics.
+
+    Raises:
+        SydaError: whatever cannot be opened; nothing moves then.
+    """
+    chosen = settings or LoopSettings()
+    if not isinstance(sinks, Sink) and not sinks:
+        raise OptionError("name at least one sink, for example 'bullet' or 'none'")
+    made = (
+        source
+        if isinstance(source, Source)
+        else make_source(
+            source, mapping.source, token=token, speed=speed, actions=actions, calibration=chosen.calibration,
+            repeat=repeat, origins=origins,
+        )
+    )  # fmt: skip
+    probe = TeleoperationLoop(mapping, chosen)
+    sink = sinks if isinstance(sinks, Sink) else make_sink(sinks, probe.robot, token=token, rate=chosen.rate)
+    with sink:
+        start = _where(sink)
+        loop = probe if start is None else TeleoperationLoop(mapping, chosen, start)
+        written = None if journal is None else Journal(Path(journal), loop, note)
+        stats = LiveStatistics()
+        try:
+            if on_start is not None:
+                on_start(Session(loop, made, sink, stats))
+            with made:
+                return run(
+                    made, loop, sink, journal=written, statistics=stats, on_decision=on_decision, seconds=seconds
+                )
+        finally:
+            if written is not None:
+                written.close()
+
+
+def _where(sink: Sink) -> FloatArray | None:
+    """Where the robot's joints are now, if the sink can tell; a run begins there rather than with a jump."""
+    ask = getattr(sink, "angles", None)
+    return None if ask is None else ask()
