@@ -99,8 +99,9 @@ def canonical_chain(chain: ArmChain) -> ArmChain:
 def zero_pose_chain(chain: ArmChain) -> ArmChain:
     """Rewrites an arm with all joint frames parallel to the torso at the zero pose and axes pointing the positive way.
 
-    Two arms with equal kinematics but other conventions (local frames, signs of angles) become equal, so that they
-    share one workspace.
+    Two arms with equal kinematics but other conventions (local frames, signs of angles, where on its axis the first
+    joint has its origin) become equal, so that they share one workspace. The shoulder, from which workspaces are
+    measured, is the point on the first joint's axis that is nearest to the second joint.
     """
     rotation = np.eye(3)
     rotations, offsets, axes = [], [], []
@@ -114,6 +115,9 @@ def zero_pose_chain(chain: ArmChain) -> ArmChain:
     flip = largest < 0.0
     frames = [np.eye(3), *rotations]
     points = [frames[joint + 1] @ point for joint, point in zip(chain.point_joints, chain.point_offsets, strict=True)]
+    slide = directions[0] * (directions[0] @ offsets[1]) if len(offsets) > 1 else np.zeros(3)
+    offsets[:2] = [offsets[0] + slide, *(offset - slide for offset in offsets[1:2])]
+    points = [point - slide * (joint == 0) for joint, point in zip(chain.point_joints, points, strict=True)]
     return replace(
         chain,
         rotations=np.repeat(np.eye(3)[None], chain.n_joints, axis=0),

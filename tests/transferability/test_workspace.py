@@ -101,6 +101,19 @@ def test_scale_alone_does_not_change_an_arm() -> None:
     assert chain_fingerprint(human_arm(0.3, 0.2)) != chain_fingerprint(human_arm(0.2, 0.3))
 
 
+def test_where_a_model_puts_its_first_origin_does_not_matter() -> None:
+    """Baxter's first joint sits 0.27 m below the shoulder, on the same axis."""
+    arm = random_chain(7, 5)
+    axis = arm.rotations[0] @ arm.axes[0]
+    down = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None] * 0.27 * axis
+    after = np.array([0.0, 1.0, 0.0, 0.0, 0.0])[:, None] * 0.27 * arm.axes[0]
+    riding = np.array([1.0, 0.0, 0.0, 0.0])[:, None] * 0.27 * arm.axes[0]
+    moved = replace(arm, offsets=arm.offsets - down + after, point_offsets=arm.point_offsets + riding)
+    assert chain_fingerprint(zero_pose_chain(moved)) == chain_fingerprint(zero_pose_chain(arm))
+    q = np.random.default_rng(0).uniform(arm.lower, arm.upper, (5, 5))
+    np.testing.assert_allclose(moved.points(q), arm.points(q), atol=1e-12)
+
+
 def test_length_is_the_farthest_reach() -> None:
     pepper = catalog.get("pepper")
     assert isinstance(pepper, Robot)
