@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.robot import Robot
 from syda_gym.files import asset, write_json
 from syda_gym.motions import Motions, PairedMotions, describe, load_motions
 from syda_gym.motions.conform import limb_directions_of
+from syda_gym.teleoperation.self_collision import SelfCollision
 
 PAIRS = (("adult", "pepper"), ("kid", "pepper"), ("stiff", "pepper"), ("adult", "kid"), ("pepper", "adult"))
 RIDGE = 0.1
@@ -28,6 +30,7 @@ def main() -> None:
             {"name": b.name, "height": b.height, "fastest": b.fastest, "filled": b.filled}
             for b in describe(motions).bodies
         ],
+        "self_contact": {name: self_contact(motions, name) for name in ("pepper", "nao")},
         "pairs": [difficulty(motions, *names) for names in PAIRS],
     }
     write_json(target, results)
@@ -59,6 +62,16 @@ def difficulty(motions: Motions, source: str, target: str) -> dict[str, Any]:
         "ridge_worst_action": worst,
         "mean_pose": float(np.mean(constant)),
     }
+
+
+def self_contact(motions: Motions, name: str) -> float:
+    """Share of every third frame in which the robot's arms touch its own body."""
+    robot = motions.bodies[name]
+    if not isinstance(robot, Robot):
+        raise TypeError(f"{name} is no robot")
+    check = SelfCollision(robot, margin=0.0)
+    touching = [check.touches(frame) for clip in motions.clips(name) for frame in clip.frames[::3]]
+    return float(np.mean(touching))
 
 
 def distance(pair: PairedMotions, predicted: FloatArray, truth: FloatArray) -> float:

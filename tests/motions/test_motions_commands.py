@@ -14,6 +14,8 @@ from syda_gym.motions import FORMATS, generate, load_motions, write_dataset
 
 from . import recordings as rec
 
+pytestmark = pytest.mark.filterwarnings("ignore::syda_gym.motions.readers.skeleton.MotionWarning")
+
 run = CliRunner(env={"COLUMNS": "200"}).invoke
 
 

@@ -33,6 +33,8 @@ from syda_gym.motions import (
 )
 from syda_gym.motions.conform import limb_directions_of
 
+pytestmark = pytest.mark.filterwarnings("ignore::syda_gym.motions.readers.skeleton.MotionWarning")
+
 
 @pytest.fixture(scope="module")
 def motions() -> Motions:

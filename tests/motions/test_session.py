@@ -15,6 +15,8 @@ from syda_gym.motions import MotionClip, Motions, generate, load_motions, operat
 
 from . import recordings as rec
 
+pytestmark = pytest.mark.filterwarnings("ignore::syda_gym.motions.readers.skeleton.MotionWarning")
+
 ACTIONS = ["wave_high", "drum", "push_side"]
 
 
