@@ -23,7 +23,7 @@ import numpy as np
 
 from syda_gym.agents.agent import Agent, BaseAlone
 from syda_gym.agents.bundle import load_agent, save_agent
-from syda_gym.agents.classical import RIVALS, make_rival
+from syda_gym.agents.classical import CONTACT_RIVALS, RIVALS, make_rival
 from syda_gym.agents.config import ResidualConfig
 from syda_gym.agents.figures import Figures
 from syda_gym.agents.predictor_training import PredictorConfig, train_predictor
@@ -154,7 +154,7 @@ def tune_rivals(study: Study) -> None:
         streams = train.record(study.size.tuning_episodes, seed=zlib.crc32(cell.encode()), clips=_spread(train, study))
         judged = validation.record(study.size.validation_episodes, seed=7)
         found = {}
-        for name in RIVALS:
+        for name in [name for name in RIVALS if name not in CONTACT_RIVALS]:
             began = time.perf_counter()
 
             def score(agent: Agent) -> Figures:

@@ -13,7 +13,7 @@ from syda_gym.agents.interface import Interface, Reading
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import AgentError, nearest_name
 
-__all__ = ["RIVALS", "Ema", "Kalman", "Lead", "OneEuro", "Range", "Rival", "make_rival"]
+__all__ = ["CONTACT_RIVALS", "RIVALS", "Ema", "Kalman", "Lead", "OneEuro", "Range", "Rival", "make_rival"]
 
 
 class Lead(Agent):
@@ -254,12 +254,31 @@ def _kalman_lead(interface: Interface, *, strength: float = 1.0, **settings: flo
     return Lead(interface, Kalman(interface, BaseAlone(interface), **settings), strength=strength)
 
 
+def _projection(interface: Interface, **settings: float) -> Agent:
+    from syda_gym.agents.projection import Projection
+
+    return Projection(interface, BaseAlone(interface), **settings)
+
+
+def _projection_lead(interface: Interface, *, strength: float = 1.0, **settings: float) -> Agent:
+    return Lead(interface, _projection(interface, **settings), strength=strength)
+
+
+CONTACT_RIVALS = ("projection", "projection_lead")
+"""Rivals that only matter where the arms touch something; they cost more time than the others."""
+
 RIVALS: Mapping[str, Rival] = {
     "base": Rival("the mapping's command, unchanged", lambda i: BaseAlone(i), {}),
     "lead": Rival("analytic inverse of the motor lag", lambda i, **s: Lead(i, BaseAlone(i), **s), _STRENGTH),
     "one_euro": Rival("One-Euro filter", lambda i, **s: OneEuro(i, BaseAlone(i), **s), _EURO),
     "one_euro_lead": Rival("One-Euro filter, then lead", _one_euro_lead, _EURO | _STRENGTH),
     "ema_lead": Rival("exponential average, then lead", _ema_lead, {"rate": Range(0.05, 1.0, log=True)} | _STRENGTH),
+    "projection": Rival("nearest command out of contact", _projection, {"margin": Range(0.0, 0.03)}),
+    "projection_lead": Rival(
+        "nearest command out of contact, then lead",
+        _projection_lead,
+        {"margin": Range(0.0, 0.03)} | _STRENGTH,
+    ),
     "kalman": Rival("constant-velocity Kalman filter on packet times, then lead", _kalman_lead, _KALMAN | _STRENGTH),
 }
 """The classical rivals by name."""

@@ -19,7 +19,7 @@ class CostWeights:
     Attributes:
         joints: weight of the joint error; that of the objective ``J`` by default.
         jitter: weight of the landmarks' third difference.
-        contact: cost of touching; it rises linearly to it over the last ``margin`` of clearance.
+        contact: cost of touching; it rises linearly over the last ``margin`` of clearance, and on while shapes overlap.
         margin: clearance below which ``contact`` begins to be paid [m].
         scale: the reward is ``(cost of the shadow - cost) / scale``.
 

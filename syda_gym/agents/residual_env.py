@@ -12,15 +12,17 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from syda_gym.agents.agent import Agent, limited
 from syda_gym.agents.interface import Reading
+from syda_gym.agents.projection import capsule_model
 from syda_gym.agents.residual import feature_count, policy_features
 from syda_gym.agents.residual_costs import CostWeights
 from syda_gym.agents.streams import Streams, read_rows
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.simulation.backend import make_world
-from syda_gym.simulation.capsules import CapsuleModel
 from syda_gym.simulation.rates import Rates
 
 __all__ = ["ResidualVecEnv"]
+
+_DEEPEST = 4.0  # margins of overlap beyond which a contact costs no more
 
 
 class ResidualVecEnv(VecEnv):  # type: ignore[misc]
@@ -72,7 +74,7 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
         self.std = np.ones(features) if std is None else std
         # Learners and shadows live in one world: rows [0, B) and [B, 2B).
         self.world = make_world(self.interface.robot, rates, count=2 * count, physics="servo")
-        self._capsules = CapsuleModel(self.interface.robot) if weights.contact else None
+        self._capsules = capsule_model(self.interface.robot) if weights.contact else None
         robot, shape = self.interface.robot, streams.reference.shape
         self._targets = robot.landmarks(streams.reference.reshape(-1, n)).reshape(*shape[:2], -1, 3)
         self._actions = np.zeros((count, n))
@@ -212,5 +214,5 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
         cost = 1e3 * (landmark + weights.joints * joint + weights.jitter * jitter)
         if self._capsules is not None:
             depth = 1.0 - self._capsules.clearance(q) / weights.margin
-            cost = cost + weights.contact * np.clip(depth, 0.0, 1.0)
+            cost = cost + weights.contact * np.clip(depth, 0.0, _DEEPEST)
         return np.asarray(cost)

@@ -12,6 +12,7 @@ from syda_gym.agents.agent import Agent, BaseAlone
 from syda_gym.agents.classical import Ema, Kalman, Lead, OneEuro
 from syda_gym.agents.interface import Interface
 from syda_gym.agents.predictor import Predictor
+from syda_gym.agents.projection import Projection
 from syda_gym.agents.residual import ResidualPolicy
 from syda_gym.errors import AgentError, nearest_name
 
@@ -20,7 +21,7 @@ __all__ = ["AGENTS", "build_stack", "stack_arrays", "stack_spec"]
 Arrays = Mapping[str, NDArray[Any]]
 
 AGENTS: Mapping[str, type[Agent]] = {
-    kind.name: kind for kind in (BaseAlone, Lead, Ema, OneEuro, Kalman, Predictor, ResidualPolicy)
+    kind.name: kind for kind in (BaseAlone, Lead, Ema, OneEuro, Kalman, Projection, Predictor, ResidualPolicy)
 }
 """Every kind of agent by name."""
 

@@ -20,6 +20,7 @@ from syda_gym.agents.interface import Interface, Reading
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import AgentError
 from syda_gym.simulation.backend import MotorConditions, make_world
+from syda_gym.simulation.capsules import CapsuleModel
 from syda_gym.simulation.rates import Rates
 
 __all__ = ["Streams", "join", "play_streams", "score_streams"]
@@ -164,7 +165,9 @@ def read_rows(
     return Reading(base=base, preview=base[:, None], q=q, qd=qd, age=age, observation=observation)
 
 
-def score_streams(agent: Agent, streams: Streams, rates: Rates, *, skip: int = 0) -> Figures:
+def score_streams(
+    agent: Agent, streams: Streams, rates: Rates, *, skip: int = 0, capsules: CapsuleModel | None = None
+) -> Figures:
     """Mean figures of an agent over all episodes.
 
     Args:
@@ -172,15 +175,22 @@ def score_streams(agent: Agent, streams: Streams, rates: Rates, *, skip: int = 0
         streams: what it sees.
         rates: control and physics rate.
         skip: steps at the start of each episode that are left out.
+        capsules: counts steps with a contact; none are counted if left out.
     """
-    return mean_figures(stream_figures(agent, streams, rates, skip=skip))
+    return mean_figures(stream_figures(agent, streams, rates, skip=skip, capsules=capsules))
 
 
-def stream_figures(agent: Agent, streams: Streams, rates: Rates, *, skip: int = 0) -> list[Figures]:
+def stream_figures(
+    agent: Agent, streams: Streams, rates: Rates, *, skip: int = 0, capsules: CapsuleModel | None = None
+) -> list[Figures]:
     """Figures of every episode."""
     q = play_streams(agent, streams, rates)
     robot = agent.interface.robot
+
+    def touching(e: int, length: int) -> NDArray[np.bool_] | None:
+        return None if capsules is None else capsules.clearance(q[e, skip:length]) < 0.0
+
     return [
-        episode_figures(robot, q[e, skip:length], streams.reference[e, skip:length])
+        episode_figures(robot, q[e, skip:length], streams.reference[e, skip:length], touching(e, length))
         for e, length in enumerate(streams.lengths.tolist())
     ]

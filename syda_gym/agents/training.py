@@ -18,6 +18,7 @@ from syda_gym.agents.checkpoint import load_checkpoint, restore_model, save_chec
 from syda_gym.agents.classical import make_rival
 from syda_gym.agents.config import ResidualConfig
 from syda_gym.agents.figures import Figures
+from syda_gym.agents.projection import capsule_model
 from syda_gym.agents.recording import Ground
 from syda_gym.agents.residual import ResidualPolicy
 from syda_gym.agents.stacks import build_stack, stack_arrays, stack_spec
@@ -252,14 +253,18 @@ class _Run:
         from syda_gym.agents.algorithms import policy_weights
 
         self.snapshots.append(policy_weights(self.model))
-        figures = score_streams(self._agent(self.snapshots[-1]), self.validation, self.rates)
-        base = self.history[0].base if self.history else score_streams(self.base, self.validation, self.rates)
+        figures = self._score(self._agent(self.snapshots[-1]))
+        base = self.history[0].base if self.history else self._score(self.base)
         self.history.append(Leg(int(self.model.num_timesteps), figures, base))
         if self.folder is not None:
             for name, value in figures.as_dict().items():
                 self.model.logger.record(f"validation/policy_{name}", value)
                 self.model.logger.record(f"validation/base_{name}", base.as_dict()[name])
             self.model.logger.dump(int(self.model.num_timesteps))
+
+    def _score(self, agent: Agent) -> Figures:
+        capsules = capsule_model(agent.interface.robot) if self.config.cost.contact else None
+        return score_streams(agent, self.validation, self.rates, capsules=capsules)
 
     def _store(self) -> None:
         if self.folder is None:
