@@ -151,6 +151,7 @@ def check_python(words: list[str]) -> None:
 def parse_with_cli(words: list[str]) -> None:
     """Parses a command line with the real command line interface, without running it."""
     import typer
+
     from syda_gym.cli import app
 
     command: Any = typer.main.get_command(app)
