@@ -105,18 +105,18 @@ def check_route(motions: Motions, route: Sequence[str]) -> Route:
     return bodies
 
 
-def action_groups(pair: PairedMotions, groups: int | str = "loao", seed: int = 0) -> list[tuple[str, ...]]:
+def action_groups(names: Sequence[str], groups: int | str = "loao", seed: int = 0) -> list[tuple[str, ...]]:
     """Actions that are held out together: every action is in exactly one group.
 
     Args:
-        pair: whose actions.
+        names: the actions.
         groups: ``"loao"`` for one action a group, or the number of groups of about equal size.
         seed: of the split into groups.
 
     Raises:
         OptionError: fewer than two groups, or more than there are actions.
     """
-    names = pair.action_names
+    names = sorted(set(names))
     if groups == "loao":
         count = len(names)
     elif isinstance(groups, int) and not isinstance(groups, bool):

@@ -31,7 +31,7 @@ __all__ = ["ChainResult", "DemoResult", "run_demo"]
 Progress = Callable[[str, float], None]
 """Told the name of the stage and its finished fraction."""
 
-_BODIES = ("adult", "kid", "tall", "pepper", "nao")
+_BODIES = ("adult", "kid", "nao", "pepper")
 """Bodies of the demo, where the motions have them: a small graph that still has several ways to go."""
 
 _FEW_ACTIONS = 12  # up to so many actions each is left out once; with more, one fifth is held out
@@ -137,7 +137,7 @@ def run_demo(
     with clock("load"):
         data = load_motions(motions)
         driven = _robot(data, robot)
-        bodies = [name for name in data.bodies if name in _BODIES or name == driven.name or len(data.bodies) <= 5]
+        bodies = [name for name in data.bodies if name in _BODIES or name == driven.name or len(data.bodies) <= 4]
         operators = [name for name in bodies if data.bodies[name].kind == "human"][:2]
         routes = all_routes(data, operators, [driven.name], 2, via=bodies)
         operators = list(dict.fromkeys(route[0] for route in routes))
@@ -164,8 +164,9 @@ def run_demo(
         with clock("residual"):
             route = chosen[operators[0]].bodies
             apart = groups[0] if len(groups) == 1 else _third(data.pair(route[0], route[-1]).action_names, seed)
+            known = fitted if apart in fitted.groups else None
             learned = train_and_compare(
-                data, route, apart, seed, folder=folder, progress=lambda done: tell("residual", done)
+                data, route, apart, seed, links=known, folder=folder, progress=lambda done: tell("residual", done)
             )
     result = DemoResult(
         data, driven, tuple(groups), links, paper_links, chosen, tuple(chains), fitted.count(), learned,
@@ -227,7 +228,7 @@ def _groups(motions: Motions, operator: str, robot: str, seed: int) -> list[tupl
     pair = motions.pair(operator, robot)
     names = list(pair.action_names)
     if len(names) <= _FEW_ACTIONS:
-        return action_groups(pair)
+        return action_groups(names)
     rng = np.random.default_rng(seed)
     by_family: dict[str, list[str]] = {}
     for name in (names[i] for i in rng.permutation(len(names))):

@@ -44,6 +44,7 @@ _TABLE_2 = {
     ("adult", "pepper"): 0.2358, ("kid", "pepper"): 0.2335, ("pepper", "kid"): 0.2002, ("pepper", "adult"): 0.1991,
 }  # fmt: skip
 _SHOWN_HZ = 15.0  # frames per second of playback and film
+_FILM_FRAMES = 75  # five seconds
 _LANDMARKS = {"left": ("L elbow", "L wrist"), "right": ("R elbow", "R wrist")}
 
 
@@ -324,10 +325,10 @@ def _liveliest(operator: Track) -> int:
 
 
 def _film(tracks: Sequence[Track], names: Sequence[str], title: str, tell: Callable[[float], None]) -> Iterator[Any]:
-    count = len(tracks[0])
+    count = min(len(tracks[0]), _FILM_FRAMES)
     for frame in range(count):
         tell(frame / count)
-        yield draw(tracks, frame, labels=names, title=title, size=(960, 540), finer=1)
+        yield draw(tracks, frame, labels=names, title=title, size=(768, 432), finer=1)
 
 
 def _mean(chain: ChainResult, name: str) -> float:

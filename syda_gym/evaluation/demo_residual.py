@@ -17,7 +17,7 @@ from syda_gym.embodiments.embodiment import landmark_error
 from syda_gym.evaluation.chains import Links, Route, name_of
 from syda_gym.evaluation.episodes import EpisodeFigures, Recording, figures_of, make_env, play_all
 from syda_gym.evaluation.report import BarPlot, Column, CurvePlot, Headline, PlaybackChain, Table, Text
-from syda_gym.evaluation.report.model import Block
+from syda_gym.evaluation.report.model import Block, Cell
 from syda_gym.evaluation.statistics import Estimate, clustered_estimate, paired_difference
 from syda_gym.motions.clip import Motions
 
@@ -104,7 +104,7 @@ class ResidualResult:
             Column("Jitter", "mm/frame³", 2, 1000),
             Column("Reward", "", 1),
         ]
-        rows = [
+        rows: list[list[Cell]] = [
             [
                 agent.name,
                 agent.estimate(agent.tracking),
@@ -135,8 +135,9 @@ class ResidualResult:
         }
         return [
             Text(
-                f"Tracking error of the residual minus that of the base, episode by episode: {1000 * change.value:+.2f} "
-                f"mm (95 % interval {1000 * change.low:+.2f} to {1000 * change.high:+.2f}): {verdict}."
+                "Tracking error of the residual minus that of the base, episode by episode: "
+                f"{1000 * change.value:+.2f} mm (95 % interval {1000 * change.low:+.2f} to {1000 * change.high:+.2f}): "
+                f"{verdict}."
             ),
             self.table(),
             BarPlot("Tracking error", "mm", [name_of(self.route)], series, 1000.0),
@@ -177,6 +178,7 @@ def train_and_compare(
     seed: int = 0,
     *,
     steps: int = STEPS,
+    links: Links | None = None,
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> ResidualResult:
@@ -188,6 +190,7 @@ def train_and_compare(
         held_out: actions for the comparison.
         seed: of the fits, the training and the episodes.
         steps: of the training.
+        links: fitted links to take the chain from; fitted anew if ``None``.
         folder: where ``residual.safetensors`` and ``residual.json`` are stored; nowhere if ``None``.
         progress: told the finished fraction.
     """
@@ -200,7 +203,7 @@ def train_and_compare(
     from syda_gym.agents.training import train_residual
 
     tell = progress or (lambda done: None)
-    mapping = Links(motions, seed=seed, groups=[tuple(held_out)]).chain(route, held_out)
+    mapping = (links or Links(motions, seed=seed, groups=[tuple(held_out)])).chain(route, held_out)
     training = [name for name in motions.pair(route[0], route[-1]).action_names if name not in held_out]
     options: dict[str, Any] = {"operator": route[0], "robot": route[-1], "mapping": mapping, "motions": motions}
     config = ResidualConfig(steps=steps, legs=4, episodes=128, validation_episodes=32)
