@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from syda_gym import cli_live
 from syda_gym.errors import SydaError
 
 if TYPE_CHECKING:
@@ -138,6 +139,10 @@ def demo(
         print_table(result.residual.table())
     console().print(f"\nReport: [bold]{result.report}[/]  (open it in a browser)")
 
+
+app.add_typer(cli_live.robot_app, name="robot")
+app.command()(cli_live.teleop)
+app.command()(cli_live.record)
 
 motions_app = typer.Typer(help="Look at recordings, check paired data sets, convert them.", no_args_is_help=True)
 app.add_typer(motions_app, name="motions")

@@ -121,8 +121,8 @@ class ReplayReport:
 
     @property
     def exact(self) -> bool:
-        """Whether every decision was the same."""
-        return self.ticks == self.same
+        """Whether there were decisions and all of them were the same."""
+        return self.ticks == self.same > 0
 
 
 def read_journal(path: str | os.PathLike[str]) -> tuple[dict[str, Any], Iterator[tuple[int, Tick, Decision]]]:

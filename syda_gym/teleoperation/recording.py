@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.robot import Robot
-from syda_gym.errors import MotionError, TeleoperationError
+from syda_gym.errors import MotionError, OptionError, TeleoperationError, nearest_name
 from syda_gym.motions.alignment import Alignment, pair_quality, pair_recordings
 from syda_gym.motions.clip import MotionClip, Motions, Take
+from syda_gym.motions.loading import load_motions
 from syda_gym.motions.session import Session
 from syda_gym.teleoperation.calibration import Calibration, Calibrator
+from syda_gym.teleoperation.choosing import geometric_mapping
 from syda_gym.teleoperation.limiter import CommandLimiter
 from syda_gym.teleoperation.sinks import Sink
 from syda_gym.teleoperation.sources import Source
 from syda_gym.teleoperation.tick import Decision, State
 from syda_gym.teleoperation.watchdog import Ease
 
-__all__ = ["RecordingOptions", "record_session"]
+__all__ = ["RecordingOptions", "choose_prompts", "record_session"]
 
 _LEAST = 8  # operator frames without which a prompt counts as missed
 
@@ -225,3 +229,55 @@ def _at(prompt: MotionClip, seconds: float) -> FloatArray:
     share = place - before
     blended: FloatArray = (1.0 - share) * prompt.frames[before] + share * prompt.frames[after]
     return blended
+
+
+def choose_prompts(
+    motions: str | os.PathLike[str] | Motions,
+    robot: str,
+    operator: str,
+    *,
+    actions: Sequence[str] = (),
+    takes: int = 1,
+) -> tuple[list[MotionClip], Embodiment]:
+    """The prompts of a session and the body that the person counts as.
+
+    A robot without motions of its own gets those of another robot, carried over by limb directions.
+
+    Args:
+        motions: where the prompts come from.
+        robot: who plays them.
+        operator: the person's body, from the motions or the catalog.
+        actions: which actions; all if empty.
+        takes: prompts per action.
+
+    Raises:
+        OptionError: an action that does not exist.
+        MotionError: no robot's motions to take prompts from.
+        EmbodimentError: unknown names.
+    """
+    data = load_motions(motions)
+    leader = data.bodies[operator] if operator in data.bodies else catalog.get(operator)
+    clips = _robot_clips(data, robot)
+    known = list(dict.fromkeys(clip.action for clip in clips))
+    for action in actions:
+        if action not in known:
+            raise OptionError(f"no action {action!r} in {data.name}; {nearest_name(action, known)}")
+    chosen = [clip for action in (actions or known) for clip in [c for c in clips if c.action == action][:takes]]
+    return chosen, leader
+
+
+def _robot_clips(data: Motions, robot: str) -> list[MotionClip]:
+    follower = data.bodies[robot] if robot in data.bodies else catalog.get(robot)
+    if not isinstance(follower, Robot):
+        raise MotionError(f"{robot!r} is a {follower.kind}; prompts are played by a robot")
+    if robot in data.bodies:
+        return [clip for clip in data.clips(robot) if not clip.mirrored]
+    others = [name for name, body in data.bodies.items() if isinstance(body, Robot)]
+    if not others:
+        raise MotionError(f"{data.name} holds no robot's motions to take prompts from; name others with --prompts")
+    carry = geometric_mapping(data.bodies[others[0]], follower)
+    return [
+        MotionClip(follower, carry.sequence(clip.frames, clip.fps), clip.fps, clip.action, clip.recording)
+        for clip in data.clips(others[0])
+        if not clip.mirrored
+    ]

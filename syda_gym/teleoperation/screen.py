@@ -69,12 +69,14 @@ def keyboard(inbox: Inbox) -> Iterator[bool]:
     try:
         import termios
         import tty
-
-        descriptor = sys.stdin.fileno()
-        before = termios.tcgetattr(descriptor)
-    except (ImportError, OSError, ValueError, AttributeError):  # no terminal, or no POSIX
+    except ImportError:  # no POSIX
         yield False
         return
+    if sys.stdin is None or sys.stdin.closed or not sys.stdin.isatty():
+        yield False
+        return
+    descriptor = sys.stdin.fileno()
+    before = termios.tcgetattr(descriptor)
     ending = threading.Event()
     tty.setcbreak(descriptor)
     thread = threading.Thread(target=_read_keys, args=(inbox, ending), name="keyboard", daemon=True)
