@@ -103,7 +103,7 @@ def play_episode(env: SydaTeleopEnv, agent: Agent, clip: int | str, *, seed: int
     reward, done = 0.0, False
     while not done:
         command = agent.act(observation[None])[0]
-        observation, gained, terminated, truncated, info = env.step(command)
+        observation, gained, terminated, truncated, info = env.step(env.action_from_command(command))  # type: ignore[arg-type]
         rows.append((info["q"], info["reference"], info["command"], info["contacts"]))
         reward += float(gained)
         done = terminated or truncated

@@ -74,7 +74,6 @@ class Fleet:
             self.robot,
             preview=options.preview,
             history=options.history,
-            action_low=-1.0 if self._residual else None,
         )
         self._blocks = dict(self.layout)
         self._weights = options.weights
@@ -82,6 +81,7 @@ class Fleet:
         self._scripts = Scripts(self.repertoire, options, count)
         self._starts = StartSampler(self.repertoire.clips, options.start)
         self._lower, self._upper = self.robot.lower, self.robot.upper
+        self._middle, self._half = 0.5 * (self._lower + self._upper), 0.5 * (self._upper - self._lower)
         # A command inside these bounds is inside the coupled limits whatever the other joints do.
         samples = np.random.default_rng(0).uniform(self._lower, self._upper, (512, n))
         low, high = self.robot.limits_at(samples)
@@ -149,7 +149,7 @@ class Fleet:
         self._start_q[rows] = base
         self._base[rows] = self._command[rows] = base
         self._correction[rows] = 0.0
-        self._action[rows] = 0.0 if self._residual else base
+        self._action[rows] = 0.0 if self._residual else (base - self._middle) / self._half
         self._past[rows] = base[:, None, None]
         pose = self.world.pose[rows]
         self._trail[0][rows], self._trail[1][rows], self._trail[2][rows] = pose[:, self._n :], 0.0, 0.0
@@ -176,13 +176,13 @@ class Fleet:
             OptionError: wrong shape, or an action that is not finite.
         """
         n, points, k, options = self._n, self._points, self._k, self.options
-        action = self._checked(actions)
+        action = np.minimum(np.maximum(self._checked(actions), -1.0), 1.0)
         base = self._base
         if self._residual:
-            action = np.minimum(np.maximum(action, -1.0), 1.0)
             correction, wanted = action, base + action * options.residual_scale
         else:
-            correction, wanted = (action - base) / options.residual_scale, action
+            wanted = self._middle + action * self._half
+            correction = (wanted - base) / options.residual_scale
         command, self._hits = self._limited(wanted)
         change = correction - self._correction
         if options.history:

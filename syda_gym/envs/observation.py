@@ -86,9 +86,7 @@ class ObservationLayout(Mapping[str, slice]):
         return f"ObservationLayout({self.size}: {parts})"
 
 
-def teleop_layout(
-    operator: Embodiment, robot: Robot, *, preview: int, history: int, action_low: float | None
-) -> ObservationLayout:
+def teleop_layout(operator: Embodiment, robot: Robot, *, preview: int, history: int) -> ObservationLayout:
     """The layout of ``SydaTeleop-v0``.
 
     Args:
@@ -96,7 +94,6 @@ def teleop_layout(
         robot: who follows.
         preview: future base commands that are shown.
         history: past base commands and joint angles that are shown.
-        action_low: -1 where actions are corrections, ``None`` where they are joint angles.
     """
     rows: list[tuple[str, str, str, float, float]] = []
     joints = list(zip(robot.joint_names, robot.lower.tolist(), robot.upper.tolist(), strict=True))
@@ -115,11 +112,8 @@ def teleop_layout(
     for (name, _, _), speed in zip(joints, robot.speed.tolist(), strict=True):
         limit = _OVERSPEED * (speed if np.isfinite(speed) else 50.0)
         rows.append(("qd", f"{name}: speed", "rad/s", -limit, limit))
-    for name, low, high in joints:
-        if action_low is None:
-            rows.append(("previous_action", f"{name}: previous command", "rad", low, high))
-        else:
-            rows.append(("previous_action", f"{name}: previous correction", "1", -1.0, 1.0))
+    for name, _, _ in joints:
+        rows.append(("previous_action", f"{name}: previous action", "1", -1.0, 1.0))
     rows.append(("packet_age", "age of the newest packet", "s", 0.0, MAX_AGE))
     for kind, label in (("base_history", "base command"), ("q_history", "angle")):
         for step in range(1, history + 1):

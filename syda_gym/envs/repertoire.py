@@ -66,6 +66,7 @@ class Repertoire:
         self.clips = _entries(source)
         self.operator_rows = _padded([clip.frames for clip in source])
         self._base: dict[int, FloatArray] = {}
+        self.base_rows(0)  # now, so that a mapping that cannot be fitted says so at once
         if options.reference == "paired":
             self.target_rows = self._with_landmarks(_padded([clip.frames for clip in target]))
         else:

@@ -33,6 +33,7 @@ class Solo(Fleet):
     def __init__(self, options: TeleopOptions) -> None:
         super().__init__(options, 1)
         self._safe = list(zip(self._safe_lower.tolist(), self._safe_upper.tolist(), strict=True))
+        self._middles, self._halves = self._middle.tolist(), self._half.tolist()
         self._low, self._high = self.layout.low, self.layout.high
         self._corners = range(0, 3 * self._points, 3)
         weights = self._weights
@@ -65,14 +66,13 @@ class Solo(Fleet):
             OptionError: wrong shape, or an action that is not finite.
         """
         n, k, base, options = self._n, self._now, self._base_values, self.options
-        values = self._values(action)
+        values = [-1.0 if v < -1.0 else 1.0 if v > 1.0 else v for v in self._values(action)]
+        scale = options.residual_scale
         if self._residual:
-            scale = options.residual_scale
-            values = [-1.0 if v < -1.0 else 1.0 if v > 1.0 else v for v in values]
             correction, command = values, [b + v * scale for b, v in zip(base, values, strict=True)]
         else:
-            correction = [(v - b) / options.residual_scale for b, v in zip(base, values, strict=True)]
-            command = values
+            command = [m + v * h for m, v, h in zip(self._middles, values, self._halves, strict=True)]
+            correction = [(c - b) / scale for b, c in zip(base, command, strict=True)]
         hits = 0
         for value, (low, high) in zip(command, self._safe, strict=True):
             if value < low or value > high:

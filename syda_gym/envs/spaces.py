@@ -21,18 +21,16 @@ RESET_OPTIONS = ("motion", "clip", "frame", "route")
 """Keys of ``reset(options=...)``; ``clip`` is another word for ``motion``."""
 
 
-def action_space(robot: Robot, options: TeleopOptions) -> Any:
-    """Corrections in [-1, 1] per arm joint, or joint angles within the limits [rad]."""
-    if options.action_mode == "residual":
-        return Box(-1.0, 1.0, (len(robot.joint_names),), dtype=np.float32)
-    return Box(robot.lower.astype(np.float32), robot.upper.astype(np.float32), dtype=np.float32)
+def action_space(robot: Robot) -> Any:
+    """One number in [-1, 1] per arm joint, in either action mode."""
+    return Box(-1.0, 1.0, (len(robot.joint_names),), dtype=np.float32)
 
 
 def action_from_command(options: TeleopOptions, robot: Robot, command: FloatArray, base: FloatArray) -> FloatArray:
     """The action whose command comes nearest to ``command`` where the base command is ``base``, any leading axes."""
     if options.action_mode == "residual":
         return np.asarray(np.clip((command - base) / options.residual_scale, -1.0, 1.0))
-    return np.asarray(np.clip(command, robot.lower, robot.upper))
+    return np.asarray(np.clip(2.0 * (command - robot.lower) / (robot.upper - robot.lower) - 1.0, -1.0, 1.0))
 
 
 def wishes(repertoire: Repertoire, options: dict[str, Any] | None, count: int) -> list[EpisodeWish]:

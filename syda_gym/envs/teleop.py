@@ -41,8 +41,9 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
 
     ``Box(-1, 1, (n,), float32)``: one correction per arm joint. The command is
     ``clamp(base + residual_scale * action)``, within the joint limits, those that depend on another joint included.
-    Zero is the mapping alone. With ``action_mode="position"`` the action is the command itself, in rad, between the
-    joint limits. Values outside the box are clipped; NaN and infinity raise ``OptionError``. For Pepper:
+    Zero is the mapping alone. With ``action_mode="position"`` the action is the command itself, -1 at the lower and 1
+    at the upper limit of the joint; ``env.unwrapped.action_from_command`` turns joint angles in rad into actions of
+    either mode. Values outside the box are clipped; NaN and infinity raise ``OptionError``. For Pepper:
 
     | index | joint | range | unit | limits of the command [rad] | top speed [rad/s] |
     |---|---|---|---|---|---|
@@ -112,16 +113,16 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     | 45 | `qd` | RElbowYaw: speed | rad/s | -14.68 | 14.68 |
     | 46 | `qd` | RElbowRoll: speed | rad/s | -18.46 | 18.46 |
     | 47 | `qd` | RWristYaw: speed | rad/s | -34.77 | 34.77 |
-    | 48 | `previous_action` | LShoulderPitch: previous correction | 1 | -1 | 1 |
-    | 49 | `previous_action` | LShoulderRoll: previous correction | 1 | -1 | 1 |
-    | 50 | `previous_action` | LElbowYaw: previous correction | 1 | -1 | 1 |
-    | 51 | `previous_action` | LElbowRoll: previous correction | 1 | -1 | 1 |
-    | 52 | `previous_action` | LWristYaw: previous correction | 1 | -1 | 1 |
-    | 53 | `previous_action` | RShoulderPitch: previous correction | 1 | -1 | 1 |
-    | 54 | `previous_action` | RShoulderRoll: previous correction | 1 | -1 | 1 |
-    | 55 | `previous_action` | RElbowYaw: previous correction | 1 | -1 | 1 |
-    | 56 | `previous_action` | RElbowRoll: previous correction | 1 | -1 | 1 |
-    | 57 | `previous_action` | RWristYaw: previous correction | 1 | -1 | 1 |
+    | 48 | `previous_action` | LShoulderPitch: previous action | 1 | -1 | 1 |
+    | 49 | `previous_action` | LShoulderRoll: previous action | 1 | -1 | 1 |
+    | 50 | `previous_action` | LElbowYaw: previous action | 1 | -1 | 1 |
+    | 51 | `previous_action` | LElbowRoll: previous action | 1 | -1 | 1 |
+    | 52 | `previous_action` | LWristYaw: previous action | 1 | -1 | 1 |
+    | 53 | `previous_action` | RShoulderPitch: previous action | 1 | -1 | 1 |
+    | 54 | `previous_action` | RShoulderRoll: previous action | 1 | -1 | 1 |
+    | 55 | `previous_action` | RElbowYaw: previous action | 1 | -1 | 1 |
+    | 56 | `previous_action` | RElbowRoll: previous action | 1 | -1 | 1 |
+    | 57 | `previous_action` | RWristYaw: previous action | 1 | -1 | 1 |
     | 58 | `packet_age` | age of the newest packet | s | 0 | 10 |
 
     ``preview=k`` appends the base commands of the next ``k`` frames to ``base_error`` (a replay knows them; live, they
@@ -235,7 +236,7 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
             "render_fps": round(self._fleet.rates.control_hz),
         }
         self.observation_space = Box(self.layout.low, self.layout.high, dtype=np.float32)
-        self.action_space = action_space(self.robot, self.options)
+        self.action_space = action_space(self.robot)
         self._started = False
         self._painter = Painter(CameraView.resolve(self.options.camera))
         self._pictures: list[Picture] = []
@@ -279,7 +280,7 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
         """One control step.
 
         Args:
-            action: ``(n,)`` corrections in [-1, 1] or joint angles [rad].
+            action: ``(n,)`` in [-1, 1].
 
         Raises:
             OptionError: wrong shape or values that are not finite.

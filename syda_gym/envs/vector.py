@@ -78,7 +78,7 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
             "autoreset_mode": self.autoreset_mode,
         }
         self.single_observation_space = Box(self.layout.low, self.layout.high, dtype=np.float32)
-        self.single_action_space = action_space(self.robot, self.options)
+        self.single_action_space = action_space(self.robot)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._painter = Painter(CameraView.resolve(self.options.camera))
