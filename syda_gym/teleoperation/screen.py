@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import select
 import sys
 import threading
@@ -79,7 +80,7 @@ def keyboard(inbox: Inbox) -> Iterator[bool]:
     before = termios.tcgetattr(descriptor)
     ending = threading.Event()
     tty.setcbreak(descriptor)
-    thread = threading.Thread(target=_read_keys, args=(inbox, ending), name="keyboard", daemon=True)
+    thread = threading.Thread(target=_read_keys, args=(descriptor, inbox, ending), name="keyboard", daemon=True)
     thread.start()
     try:
         yield True
@@ -89,14 +90,15 @@ def keyboard(inbox: Inbox) -> Iterator[bool]:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
 
 
-def _read_keys(inbox: Inbox, ending: threading.Event) -> None:
+def _read_keys(descriptor: int, inbox: Inbox, ending: threading.Event) -> None:
     while not ending.is_set():
-        ready, _, _ = select.select([sys.stdin], [], [], 0.1)
+        ready, _, _ = select.select([descriptor], [], [], 0.1)
         if not ready:
             continue
-        key = sys.stdin.read(1)
-        if key == "q":
-            inbox.close()
-            return
-        if key in KEYS:
-            inbox.request(KEYS[key])
+        # Unbuffered: sys.stdin would swallow keys typed together, and one of them may be the emergency stop.
+        for key in os.read(descriptor, 64).decode("utf-8", "replace"):
+            if key == "q":
+                inbox.close()
+                return
+            if key in KEYS:
+                inbox.request(KEYS[key])
