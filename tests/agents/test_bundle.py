@@ -28,7 +28,7 @@ def deep_stack(interface):
     weights = {name: rng.normal(0, 0.1, size).astype(np.float32) for name, size in shapes.items()}
     kalman = make_rival("kalman", interface, process=7.0).base
     predictor = Predictor(interface, kalman, weights=weights, channels=8)
-    return random_policy(interface, Lead(interface, predictor, strength=0.8))
+    return random_policy(interface, Lead(interface, predictor, strength=0.8), size=0.05)
 
 
 @pytest.fixture
