@@ -2,7 +2,7 @@
 
 Every pair of bodies is fitted without the actions of a fold and every chain is scored on them, so that no frame of a
 test action is seen by any link. A chain's error is the mean distance of elbows and wrists [m] over the target's arm
-length, on the arms that all its bodies have.
+length, on the arms that both its ends have.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from syda_gym.embodiments.embodiment import Embodiment, FloatArray, Side
+from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.errors import MotionError, OptionError
 from syda_gym.evaluation.prediction_scores import PredictorScore, score_predictors
 from syda_gym.mappings.fitting import fit_many
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
+from syda_gym.transferability.measured import measured_bodies
 from syda_gym.transferability.metric import Transferability, transferability
 from syda_gym.transferability.noise import alpha_from_noise, high_frequency_noise
 
@@ -31,7 +32,7 @@ Progress = Callable[[str, float], None]
 Names = tuple[str, ...]
 
 _LAG_SECONDS = 0.2
-_MOST_TEST_FRAMES = 250
+_MOST_TEST_FRAMES = 120
 _MOST_TRAINING_FRAMES = 400
 
 
@@ -288,10 +289,9 @@ def _walk(
 
 
 def _error(table: _Frames, route: Names, mapped: FloatArray, rows: NDArray[np.intp]) -> float:
-    """Mean distance of elbows and wrists [m] on the arms that all bodies of the route have."""
-    body = table.bodies[route[-1]]
-    shared: list[Side] = [side for side in body.sides if all(side in table.bodies[name].sides for name in route)]
-    arms = [body.sides.index(side) for side in shared or body.sides]
+    """Mean distance of elbows and wrists [m] on the arms that both ends have."""
+    body, source = table.bodies[route[-1]], table.bodies[route[0]]
+    arms = [i for i, side in enumerate(body.sides) if side in source.sides] or list(range(len(body.sides)))
     gap = body.arm_points(mapped)[:, arms, 1:] - body.arm_points(table.frames[route[-1]][rows])[:, arms, 1:]
     return float(np.linalg.norm(gap, axis=-1).mean())
 
@@ -304,6 +304,7 @@ def _results(
     errors: dict[Names, float],
 ) -> tuple[RouteResult, ...]:
     results = []
+    quality = measured_bodies(training)
     for route, metres in errors.items():
         steps = list(zip(route[:-1], route[1:], strict=True))
         general = [links["general"][step] for step in steps]
@@ -318,9 +319,18 @@ def _results(
             "C_both_ways": [link.C * other.C for link, other in zip(general, back, strict=True)],
             "noise_alpha": [alpha[frozenset(step)] for step in steps],
         }
-        predicted = {name: float(np.prod(values)) for name, values in products.items()}
+        carried = _carried(bodies, route)
+        predicted = {name: carried * float(np.prod(values)) for name, values in products.items()}
         predicted["arm_length_ratio"] = links["general"][route[0], route[-1]].L
         predicted["hops"] = -float(len(steps))
-        predicted["training_error"] = -sum(training[step] for step in steps)
+        predicted["training_error"] = -sum(training[step] for step in steps) / max(carried, 1e-3)
+        predicted["measured"] = -quality.error(route) / max(carried, 1e-3)
         results.append(RouteResult(route, metres / bodies[route[-1]].reach, metres, predicted))
     return tuple(results)
+
+
+def _carried(bodies: dict[str, Embodiment], route: Names) -> float:
+    """Share of the arms of both ends that every body on the way has, as in ``transferability.routing``."""
+    shared = [side for side in bodies[route[0]].sides if side in bodies[route[-1]].sides]
+    kept = [side for side in shared if all(side in bodies[name].sides for name in route)]
+    return len(kept) / len(shared) if shared else 1.0

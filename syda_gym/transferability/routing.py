@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
 
@@ -50,8 +50,10 @@ class Route:
 
     Attributes:
         bodies: names from source to target.
-        T: product of the links' transferabilities (Eq. 11).
+        T: product of the links' transferabilities (Eq. 11) times ``carried``.
         links: the transferability of each link.
+        carried: share of the arms of both ends that every body on the way has; 0.5 if a one-armed body stands between
+            two-armed ones, because C is a mean over arms and nothing of the other arm arrives.
         score: product of the predictor along the route; equals ``T`` for the predictor ``T``.
         tolerance: half-width of the band of ``score`` in which another route counts as equal.
         ties: other routes within the tolerance, best first (filled by ``best_route``).
@@ -63,6 +65,7 @@ class Route:
     score: float
     tolerance: float
     ties: tuple[Route, ...] = ()
+    carried: float = 1.0
 
     @property
     def hops(self) -> int:
@@ -77,6 +80,7 @@ class Route:
             "score": self.score,
             "tolerance": self.tolerance,
             "hops": self.hops,
+            "carried": self.carried,
             "links": [link.as_dict() for link in self.links],
             "ties": [list(route.bodies) for route in self.ties],
         }
@@ -161,10 +165,22 @@ class BodyGraph:
 
     def route(self, names: Sequence[str]) -> Route:
         """The route along the given bodies."""
-        links = tuple(self.link(a, b) for a, b in zip(names[:-1], names[1:], strict=True))
-        score = math.prod(self.score(a, b) for a, b in zip(names[:-1], names[1:], strict=True))
+        steps = list(zip(names[:-1], names[1:], strict=True))
+        links = tuple(self.link(a, b) for a, b in steps)
+        shared = self._shared_arms(names[0], names[-1])
+        carried = math.prod(self._carried(a, b, shared) for a, b in steps)
+        score = carried * math.prod(self.score(a, b) for a, b in steps)
         relative = math.sqrt(sum((link.tolerance / link.T) ** 2 for link in links if link.T > 0.0))
-        return Route(tuple(names), math.prod(link.T for link in links), links, score, relative * score)
+        product = carried * math.prod(link.T for link in links)
+        return Route(tuple(names), product, links, score, relative * score, carried=carried)
+
+    def _shared_arms(self, start: str, end: str) -> frozenset[str]:
+        return frozenset(self.bodies[start].sides) & frozenset(self.bodies[end].sides)
+
+    def _carried(self, a: str, b: str, shared: frozenset[str]) -> float:
+        """Share of the arms in question that get from ``a`` to ``b``."""
+        before = shared & frozenset(self.bodies[a].sides)
+        return len(before & frozenset(self.bodies[b].sides)) / len(before) if before else 1.0
 
     def routes(self, source: Body, target: Body, max_hops: int | None = None) -> Iterator[Route]:
         """Routes from source to target, best first, without repeated bodies.
@@ -181,10 +197,13 @@ class BodyGraph:
             raise OptionError(f"max_hops must be at least 1, got {max_hops}")
         weighted = networkx.DiGraph()
         weighted.add_nodes_from(self.graph.nodes)
+        shared = self._shared_arms(start, end)
         reachable = self._between(start, end, max_hops)
         for a, b in self.graph.edges:
-            if a in reachable and b in reachable and (value := self.score(a, b)) > 0.0:
-                weighted.add_edge(a, b, weight=-math.log(value))
+            if a in reachable and b in reachable:
+                value = self.score(a, b) * self._carried(a, b, shared)
+                if value > 0.0:
+                    weighted.add_edge(a, b, weight=-math.log(value))
         if not networkx.has_path(weighted, start, end):
             raise RouteError(self._no_path(start, end, max_hops))
         return self._simple_paths(weighted, start, end, max_hops)
@@ -265,7 +284,7 @@ def best_route(
         if best.score - other.score > max(best.tolerance, other.tolerance):
             break
         ties.append(other)
-    return Route(best.bodies, best.T, best.links, best.score, best.tolerance, tuple(ties))
+    return replace(best, ties=tuple(ties))
 
 
 def ranked_routes(

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from syda_gym.embodiments import catalog
 from syda_gym.errors import EmbodimentError, OptionError, RouteError
 from syda_gym.transferability.metric import Transferability
 from syda_gym.transferability.routing import (
@@ -67,6 +68,14 @@ def test_scaled_copies_on_the_way_cost_only_length() -> None:
     assert pytest.approx(by_adult.links[0].C * by_adult.links[1].T) == by_adult.T
 
 
+def test_a_one_armed_body_on_the_way_loses_an_arm() -> None:
+    around = ranked_routes("tall", "pepper", [("tall", "left_only"), ("left_only", "pepper")], **FAST)[0]
+    assert around.carried == 0.5
+    assert pytest.approx(0.5 * around.links[0].T * around.links[1].T) == around.T
+    ends = ranked_routes("left_only", "pepper", [("left_only", "tall"), ("tall", "pepper")], **FAST)[0]
+    assert ends.carried == 1.0  # its only arm is all that is asked for
+
+
 def test_predictors() -> None:
     fewest = best_route("adult", "pepper", [*PAIRS, ("adult", "pepper")], predictor="hops", **FAST)
     assert fewest.bodies == ("adult", "pepper")
@@ -113,7 +122,7 @@ class _Drawn(BodyGraph):
         self._scores = scores
         for a, b in scores:
             for name in (str(a), str(b)):
-                self.bodies[name] = None  # type: ignore[assignment]
+                self.bodies[name] = catalog.get("adult")
                 self.graph.add_node(name)
             self.graph.add_edge(str(a), str(b))
 
