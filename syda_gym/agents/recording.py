@@ -44,7 +44,7 @@ class Ground:
             )
         self.repertoire = Repertoire(self.options)
         self.rates = self.options.rates
-        layout = teleop_layout(self.repertoire.operator, self.repertoire.robot, preview=0, history=0, action_low=None)
+        layout = teleop_layout(self.repertoire.operator, self.repertoire.robot, preview=0, history=0)
         self.interface = Interface(
             self.repertoire.robot, dict(layout), layout.size, self.rates.dt, self.rates.lag_share
         )
