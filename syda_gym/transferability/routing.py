@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
@@ -98,6 +98,8 @@ class BodyGraph:
         definition: ``general`` or ``paper``.
         directed: a pair serves from first to second only; by default both ways, as SyDa models invert.
         predictor: what to multiply along a route: a name of ``PREDICTORS`` or a function of a link.
+        alpha: noise coefficients of pairs, for example from ``noise.alpha_from_noise``; the definition's own where
+            absent.
         options: options of ``transferability`` (seed, samples, ...).
 
     Raises:
@@ -113,6 +115,7 @@ class BodyGraph:
         *,
         directed: bool = False,
         predictor: str | Predictor = "T",
+        alpha: Mapping[frozenset[str], float] | None = None,
         **options: Any,
     ) -> None:
         import networkx
@@ -121,6 +124,7 @@ class BodyGraph:
         self.directed = directed
         self._score = _predictor(predictor)
         self._options = options
+        self._alpha = dict(alpha or {})
         self._measured: dict[tuple[str, str], Transferability] = {}
         self.bodies: dict[str, Embodiment] = {}
         self.graph: Any = networkx.DiGraph()
@@ -149,7 +153,13 @@ class BodyGraph:
     def link(self, a: str, b: str) -> Transferability:
         """Transferability from body ``a`` to body ``b``, measured once."""
         if (a, b) not in self._measured:
-            self._measured[a, b] = measure(self.bodies[a], self.bodies[b], self.definition, **self._options)
+            self._measured[a, b] = measure(
+                self.bodies[a],
+                self.bodies[b],
+                self.definition,
+                alpha=self._alpha.get(frozenset((a, b))),
+                **self._options,
+            )
         return self._measured[a, b]
 
     def score(self, a: str, b: str) -> float:
@@ -266,7 +276,7 @@ def best_route(
         max_hops: longest chain allowed; ``None`` for any.
         directed: pairs serve from first to second only.
         predictor: what decides: a name of ``PREDICTORS`` or a function of a link with values in [0, 1].
-        options: options of ``transferability``.
+        options: ``alpha`` (noise coefficients of pairs) and options of ``transferability``.
 
     Raises:
         RouteError: no such body, no path, or none within ``max_hops``.

@@ -76,6 +76,14 @@ def test_a_one_armed_body_on_the_way_loses_an_arm() -> None:
     assert ends.carried == 1.0  # its only arm is all that is asked for
 
 
+def test_noisy_pairs_are_avoided_with_alpha() -> None:
+    alpha = {frozenset(("adult", "kid")): 0.2}
+    assert best_route("adult", "pepper", PAIRS[:4], **FAST).bodies == ("adult", "kid", "pepper")
+    quiet = best_route("adult", "pepper", PAIRS[:4], alpha=alpha, **FAST)
+    assert quiet.bodies == ("adult", "stiff", "pepper")
+    assert [link.alpha for link in quiet.links] == [1.0, 1.0]
+
+
 def test_predictors() -> None:
     fewest = best_route("adult", "pepper", [*PAIRS, ("adult", "pepper")], predictor="hops", **FAST)
     assert fewest.bodies == ("adult", "pepper")
