@@ -351,6 +351,7 @@ def route(
     max_hops: Annotated[int | None, typer.Option(help="Longest chain.", min=1)] = None,
     predictor: Annotated[str, typer.Option(help="What decides: `T`, `C`, `L`, `coverage`, `hops`, ...")] = "T",
     count: Annotated[int, typer.Option(help="How many routes to list.", min=1)] = 5,
+    noise: Annotated[bool, typer.Option("--noise", help="Take alpha from the noise of the recordings.")] = False,
     suggest: Annotated[bool, typer.Option("--suggest", help="Also say which pair to record next.")] = False,
     picture: Annotated[Path | None, typer.Option(help="Write the graph with the chosen route as PNG.")] = None,
     as_json: JsonOption = False,
@@ -362,17 +363,23 @@ def route(
 
     fitted, bodies = _fitted_pairs(pairs, motions)
     options: dict[str, Any] = {"max_hops": max_hops, "predictor": predictor}
+    if noise:
+        from syda_gym.evaluation.prediction import motion_noise
+        from syda_gym.motions.loading import load_motions
+        from syda_gym.transferability.noise import alpha_from_noise
+
+        options["alpha"] = alpha_from_noise(motion_noise(load_motions(motions)))
     best = routing.best_route(source, target, fitted, definition, **options)  # type: ignore[arg-type]
     ranked = routing.ranked_routes(source, target, fitted, definition, count=count, **options)  # type: ignore[arg-type]
     routes = [best, *(other for other in ranked if other.bodies != best.bodies)][:count]
     further, spanning = None, None
     if suggest:
         further = suggestion.suggest(bodies, fitted, definition, **options)[:count]  # type: ignore[arg-type]
-        spanning = suggestion.spanning_pairs(bodies, (), definition, predictor=predictor)  # type: ignore[arg-type]
+        spanning = suggestion.spanning_pairs(bodies, (), definition, predictor=predictor, alpha=options.get("alpha"))  # type: ignore[arg-type]
     if picture:
         from syda_gym.transferability.pictures import graph_png
 
-        graph = routing.BodyGraph((), fitted, definition, predictor=predictor)  # type: ignore[arg-type]
+        graph = routing.BodyGraph((), fitted, definition, predictor=predictor, alpha=options.get("alpha"))  # type: ignore[arg-type]
         write_bytes(picture, graph_png(graph, best))
     if as_json:
         print_json({

@@ -26,7 +26,7 @@ from syda_gym.transferability.measured import measured_bodies
 from syda_gym.transferability.metric import Transferability, transferability
 from syda_gym.transferability.noise import alpha_from_noise, high_frequency_noise
 
-__all__ = ["PredictionStudy", "RouteResult", "validate"]
+__all__ = ["PredictionStudy", "RouteResult", "motion_noise", "validate"]
 
 Progress = Callable[[str, float], None]
 Names = tuple[str, ...]
@@ -147,7 +147,7 @@ def validate(
         raise OptionError(f"folds must be between 2 and the number of actions, {len(table.distinct)}; got {folds}")
     if max_hops < 1:
         raise OptionError(f"max_hops must be at least 1, got {max_hops}")
-    noise = _noise(full, names)
+    noise = motion_noise(full, names)
     links = _links(table.bodies, samples, seed)
     groups = np.array_split(np.random.default_rng(seed).permutation(table.distinct), folds)
     fits = _fit_all(table, groups, method, preset, seed, max(1, round(_LAG_SECONDS * fps)), progress)
@@ -201,10 +201,18 @@ class _Frames:
         return rows[:: max(1, -(-len(rows) // most))]
 
 
-def _noise(motions: Motions, names: Names) -> dict[str, float]:
-    """High-frequency noise of each body's landmarks over its arm length, at the full frame rate."""
+def motion_noise(motions: Motions, names: Sequence[str] | None = None) -> dict[str, float]:
+    """High-frequency noise of each body's landmarks over its arm length, at the full frame rate.
+
+    Args:
+        motions: recordings.
+        names: bodies; all by default.
+
+    Returns:
+        Body to noise, to be given to ``transferability.noise.alpha_from_noise``.
+    """
     found = {}
-    for name in names:
+    for name in names or motions.bodies:
         body = motions.bodies[name]
         clips = [body.landmarks(clip.frames) for clip in motions.clips(name) if len(clip) > 3]
         found[name] = high_frequency_noise(clips) / body.reach
