@@ -38,7 +38,7 @@ def high_frequency_noise(clips: Iterable[ArrayLike]) -> float:
     return float(np.median(np.abs(np.concatenate(rough))) / (_MEDIAN_TO_SIGMA * _GAIN))
 
 
-def alpha_from_noise(noise: Mapping[str, float]) -> dict[frozenset[str], float]:
+def alpha_from_noise(noise: Mapping[str, float], resolution: float = 0.005) -> dict[frozenset[str], float]:
     """Noise coefficients alpha = sigma_min / sigma_pair of all pairs (Eq. 10).
 
     The paper calls alpha the ratio of noise in the system and estimates it by hand (0.76 for the kid with Pepper).
@@ -46,6 +46,8 @@ def alpha_from_noise(noise: Mapping[str, float]) -> dict[frozenset[str], float]:
 
     Args:
         noise: body to noise, all in one unit, best over the arm's length.
+        resolution: smaller noise counts as this much, so that a robot's exact encoders do not make everybody else
+            look hopeless; half a percent of the arm's length by default.
 
     Returns:
         Pair of names to alpha in (0, 1].
@@ -56,10 +58,11 @@ def alpha_from_noise(noise: Mapping[str, float]) -> dict[frozenset[str], float]:
     names = list(noise)
     if len(names) < 2 or not all(np.isfinite(noise[name]) and noise[name] >= 0.0 for name in names):
         raise OptionError(f"alpha needs the noise of at least two bodies, finite and not negative; got {dict(noise)}")
+    if not resolution > 0.0:
+        raise OptionError(f"resolution must be positive, got {resolution}")
+    floored = {name: max(value, resolution) for name, value in noise.items()}
     pairs = {
-        frozenset((a, b)): float(np.hypot(noise[a], noise[b])) for i, a in enumerate(names) for b in names[i + 1 :]
+        frozenset((a, b)): float(np.hypot(floored[a], floored[b])) for i, a in enumerate(names) for b in names[i + 1 :]
     }
     least = min(pairs.values())
-    if least <= 0.0:
-        raise OptionError(f"a pair without any noise sets no scale for alpha: {dict(noise)}; leave alpha at 1")
     return {pair: least / value for pair, value in pairs.items()}

@@ -22,10 +22,10 @@ def test_noise_is_found_under_motion(sigma: float) -> None:
 
 
 def test_alpha_is_one_for_the_cleanest_pair() -> None:
-    alpha = alpha_from_noise({"robot": 0.0, "adult": 0.01, "kid": 0.02})
+    alpha = alpha_from_noise({"robot": 0.0, "adult": 0.01, "kid": 0.02}, resolution=0.005)
     assert alpha[frozenset(("robot", "adult"))] == 1.0
-    assert alpha[frozenset(("robot", "kid"))] == pytest.approx(0.5)
-    assert alpha[frozenset(("adult", "kid"))] == pytest.approx(0.01 / np.hypot(0.01, 0.02))
+    assert alpha[frozenset(("robot", "kid"))] == pytest.approx(np.hypot(0.005, 0.01) / np.hypot(0.005, 0.02))
+    assert alpha[frozenset(("adult", "kid"))] == pytest.approx(np.hypot(0.005, 0.01) / np.hypot(0.01, 0.02))
 
 
 def test_bad_noise() -> None:
@@ -33,5 +33,6 @@ def test_bad_noise() -> None:
         high_frequency_noise([np.zeros((3, 3))])
     with pytest.raises(OptionError, match="at least two"):
         alpha_from_noise({"adult": 0.1})
-    with pytest.raises(OptionError, match="no scale"):
-        alpha_from_noise({"a": 0.0, "b": 0.0})
+    with pytest.raises(OptionError, match="resolution"):
+        alpha_from_noise({"a": 0.0, "b": 0.0}, resolution=0.0)
+    assert alpha_from_noise({"a": 0.0, "b": 0.0}) == {frozenset("ab"): 1.0}
