@@ -2,7 +2,7 @@
 
     python examples/train_a_residual.py [STEPS]
 
-The link is noisy and the motors lag. The policy learns in the fast motor model; the judgement is made in Bullet. A short
+The link is noisy and the motors lag. The policy learns in the fast motor model and is judged in Bullet. A short
 run shows the way, not what can be reached: syda-gym train and the page on agents do it in earnest.
 """
 
