@@ -263,37 +263,30 @@ def _errors(
     """Training error of every link over arm length, and held-out error of every route [m], means over folds."""
     training: dict[tuple[str, str], list[float]] = {}
     held: dict[Names, list[float]] = {}
-    steps, done = len(groups) * len(table.bodies), 0
-    for group, fold in zip(groups, fits, strict=True):
+    for done, (group, fold) in enumerate(zip(groups, fits, strict=True)):
         rows, seen = table.rows(group, test=True), table.rows(group, test=False)
         for (a, b), link in fold.items():
             error = _error(table, (a, b), link(table.frames[a][seen]), seen)
             training.setdefault((a, b), []).append(error / table.bodies[b].reach)
-        for source in table.bodies:
-            _walk(table, fold, rows, (source,), table.frames[source][rows], max_hops, held)
-            done += 1
+        arrived: dict[Names, FloatArray] = {(name,): table.frames[name][rows] for name in table.bodies}
+        for hop in range(max_hops):
+            arrived = _step(fold, arrived)
+            for route, mapped in arrived.items():
+                held.setdefault(route, []).append(_error(table, route, mapped, rows))
             if progress:
-                progress("chains", done / steps)
+                progress("chains", (done + (hop + 1) / max_hops) / len(groups))
     return {k: float(np.mean(v)) for k, v in training.items()}, {k: float(np.mean(v)) for k, v in held.items()}
 
 
-def _walk(
-    table: _Frames,
-    fold: dict[tuple[str, str], Mapping],
-    rows: NDArray[np.intp],
-    path: Names,
-    frames: FloatArray,
-    hops: int,
-    held: dict[Names, list[float]],
-) -> None:
-    """Scores every route that continues ``path``, whose last body moves as ``frames``; shared beginnings run once."""
-    for name in table.bodies:
-        if name not in path:
-            route = (*path, name)
-            mapped = fold[path[-1], name](frames)
-            held.setdefault(route, []).append(_error(table, route, mapped, rows))
-            if hops > 1:
-                _walk(table, fold, rows, route, mapped, hops - 1, held)
+def _step(fold: dict[tuple[str, str], Mapping], arrived: dict[Names, FloatArray]) -> dict[Names, FloatArray]:
+    """All routes one link longer, with the frames that arrive; each link maps the frames of all its routes at once."""
+    longer: dict[Names, FloatArray] = {}
+    for (a, b), link in fold.items():
+        routes = [route for route in arrived if route[-1] == a and b not in route]
+        if routes:
+            mapped = link(np.concatenate([arrived[route] for route in routes]))
+            longer.update(zip([(*route, b) for route in routes], np.split(mapped, len(routes)), strict=True))
+    return longer
 
 
 def _error(table: _Frames, route: Names, mapped: FloatArray, rows: NDArray[np.intp]) -> float:
