@@ -141,6 +141,41 @@ def demo(
 
 
 app.add_typer(cli_live.robot_app, name="robot")
+
+
+@app.command("reproduce-paper")
+def reproduce_paper(
+    motions: Annotated[
+        str, typer.Option("--motions", "-m", help="`paper:DIR`: the paper's recordings.", metavar="SPEC")
+    ],
+    out: OutOption = Path("reproduce-paper"),
+    seeds: Annotated[int, typer.Option(help="Seeds of splits and networks.", min=1)] = 10,
+    protocol: Annotated[list[str] | None, typer.Option(help="Only `rand3`, `twin3` or `loao`; repeatable.")] = None,
+    method: Annotated[list[str] | None, typer.Option(help="Only this `method/preset`; repeatable.")] = None,
+    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 2,
+) -> None:
+    """Print the paper's Tables 2 to 5 beside ours: every method, three labelled protocols, many seeds."""
+    from syda_gym.evaluation.paper import reproduce
+    from syda_gym.evaluation.paper_report import tables
+    from syda_gym.motions.clip import PROTOCOLS
+
+    with stages({"study": "Fitting and scoring"}) as tell:
+        study = reproduce(
+            motions,
+            out,
+            seeds=seeds,
+            protocols=tuple(protocol) if protocol else PROTOCOLS,
+            contenders=method,
+            workers=workers,
+            progress=lambda fraction, _: tell("study", fraction),
+        )
+    for table in tables(study):
+        print_table(table)
+    for name, reason in study.skipped.items():
+        console(stderr=True).print(f"left out {name}: {reason}", markup=False)
+    console(stderr=True).print(f"tables, plots and study.json are in {out}", markup=False)
+
+
 app.command()(cli_live.teleop)
 app.command()(cli_live.record)
 

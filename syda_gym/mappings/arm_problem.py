@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -104,7 +104,11 @@ def fit_problems(
     Returns:
         One mapping per job.
     """
-    problems = [ArmProblem.build(job.pair, job.seed, max_lag, placed) for job in jobs]
+    built: dict[int, ArmProblem] = {}
+    for job in jobs:
+        if id(job.pair) not in built:
+            built[id(job.pair)] = ArmProblem.build(job.pair, job.seed, max_lag, placed)
+    problems = [replace(built[id(job.pair)], seed=job.seed) for job in jobs]
     groups = [_groups(problem.pair) if confidence else [] for problem in problems]
     held_out = [problem.without(g, max_lag, placed) for problem, gs in zip(problems, groups, strict=True) for g in gs]
     fitted = iter(fitter([*problems, *held_out]))

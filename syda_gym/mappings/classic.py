@@ -67,18 +67,22 @@ def fit_accurate(jobs: Sequence[FitJob], progress: Progress | None = None) -> li
         if problems[0].pair.source_body.kind == problems[0].pair.target_body.kind:
             return [HopRegressor.fit(*problem.rows, float(own["hop_shrinkage"])) for problem in problems]
         networks = fit_networks(problems, GENERAL, progress)
-        return [_both_ways(problem, network, own) for problem, network in zip(problems, networks, strict=True)]
+        # Only the network depends on the seed; fits of the same frames share the other members.
+        closed: dict[int, tuple[MeanRegressor, list[Regressor]]] = {}
+        for problem in problems:
+            if id(problem.pair) not in closed:
+                closed[id(problem.pair)] = _members(problem, own)
+        return [
+            _both_ways(problem, network, *closed[id(problem.pair)])
+            for problem, network in zip(problems, networks, strict=True)
+        ]
 
     return fit_problems(jobs, "syda", fitter, max_lag=int(own["lag"]), confidence=bool(own["confidence"]))
 
 
-def _both_ways(problem: ArmProblem, network: Regressor, own: dict[str, Any]) -> Regressor:
-    """Four members towards a robot; towards a human two of them and the inverse of the SyDa network."""
-    human, robot = problem.rows
-    to_robot = robot.shape[1] == 6
-    back = network.inverse()
-    if not to_robot:
-        human, robot, network, back = robot, human, back, network
+def _members(problem: ArmProblem, own: dict[str, Any]) -> tuple[MeanRegressor, list[Regressor]]:
+    """Four members towards a robot, two towards a human."""
+    human, robot = problem.rows if problem.pair.target_body.kind == "robot" else problem.rows[::-1]
     shrinkage, penalty, gamma = (float(own[name]) for name in ("shrinkage", "kernel_shrinkage", "gamma"))
     width = human.shape[1]
     members: list[Regressor] = []
@@ -87,13 +91,19 @@ def _both_ways(problem: ArmProblem, network: Regressor, own: dict[str, Any]) -> 
         members.append(KernelRidge.fit(human[:, start:], robot - human[:, -6:], penalty, gamma))
     columns = [(0, width), (0, width), (width - 6, width), (width - 6, width)]
     there = MeanRegressor(members, columns, [False, True, False, True])
-    reverse: list[Regressor] = [
+    home: list[Regressor] = [
         Ridge.fit(robot, human, shrinkage, robust=True),
         KernelRidge.fit(robot, human, penalty, gamma),
-        back,
     ]
-    home = MeanRegressor(reverse, [(0, 6)] * 3, [False] * 3)
-    return TwoWay(there, home) if to_robot else TwoWay(home, there)
+    return there, home
+
+
+def _both_ways(problem: ArmProblem, network: Regressor, there: MeanRegressor, home: list[Regressor]) -> Regressor:
+    """The members both ways; towards a human together with the SyDa network."""
+    to_robot = problem.pair.target_body.kind == "robot"
+    back = network.inverse() if to_robot else network
+    mean = MeanRegressor([*home, back], [(0, 6)] * 3, [False] * 3)
+    return TwoWay(there, mean) if to_robot else TwoWay(mean, there)
 
 
 def _fit(

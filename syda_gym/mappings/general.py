@@ -60,7 +60,7 @@ INTERPOLATION = TrainingSettings(
     rate=3e-3,
     cosine=True,
     batch=64,
-    epochs=200,
+    epochs=120,
 )
 """For test poses that come from trained actions: capacity pays there."""
 
