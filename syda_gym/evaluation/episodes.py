@@ -239,7 +239,9 @@ def figures_of(recording: Recording, robot: Robot, mapping: Mapping, capsules: A
     )
 
 
-def latency(mapping: Mapping, agent: Agent | None, frames: FloatArray, observation: FloatArray | None = None) -> float:
+def latency(
+    mapping: Mapping, agent: Agent | None, frames: FloatArray, observation: NDArray[np.float32] | None = None
+) -> float:
     """Median time that one frame takes through the chain and the agent, frame by frame as in live use [s].
 
     Args:
