@@ -8,7 +8,7 @@ import sys
 import gymnasium as gym
 
 import syda_gym  # noqa: F401  (registers the environment)
-from syda_gym.evaluation.drawing import write_video
+from syda_gym.simulation.video import write_video
 
 film = sys.argv[1] if len(sys.argv) > 1 else "random_agent.mp4"
 env = gym.make("SydaTeleop-v0", render_mode="rgb_array")
@@ -20,6 +20,6 @@ for _ in range(60):
     pictures.append(env.render())
     if terminated or truncated:
         env.reset()
-write_video(pictures, film, fps=env.metadata["render_fps"])
+write_video(film, pictures, fps=env.metadata["render_fps"])
 print(f"{film}: {len(pictures)} frames of {pictures[0].shape[1]}x{pictures[0].shape[0]}")
 env.close()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from syda_gym.evaluation.chains import name_of
-from syda_gym.evaluation.drawing import draw, write_png, write_video
+from syda_gym.evaluation.drawing import draw, write_png
 from syda_gym.evaluation.report import (
     BarPlot,
     Column,
@@ -32,6 +32,7 @@ from syda_gym.evaluation.report.model import Block, Cell
 from syda_gym.evaluation.report.plots import bar_svg, standalone
 from syda_gym.evaluation.statistics import Estimate, spearman
 from syda_gym.files import write_json, write_text
+from syda_gym.simulation.video import write_video
 
 if TYPE_CHECKING:
     from syda_gym.evaluation.demo import ChainResult, DemoResult
@@ -76,7 +77,7 @@ def write_demo_report(
     middle = _liveliest(tracks[0])
     picture = draw(shown, middle, labels=names, title=title)
     write_png(picture, folder / "side_by_side.png")
-    write_video(_film(shown, names, title, tell), folder / "chains.mp4", _SHOWN_HZ)
+    write_video(folder / "chains.mp4", _film(shown, names, title, tell), _SHOWN_HZ)
     sections = [
         Section("Playback", [_playback(result)]),
         Section("Which way to go", [_graph(result), transferability_table(result)]),

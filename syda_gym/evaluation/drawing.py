@@ -1,4 +1,4 @@
-"""Pictures and films of bodies side by side, drawn in numpy: the same solids and light as in the report's playback.
+"""Pictures of bodies side by side, drawn in numpy: the same solids and light as in the report's playback.
 
 The camera is orthographic, so that bodies keep their relative sizes. Each solid is intersected with the rays of the
 pixels in its bounding box, and a depth buffer keeps the nearest.
@@ -7,18 +7,18 @@ pixels in its bounding box, and a depth buffer keeps the nearest.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.errors import OptionError, StorageError
+from syda_gym.errors import OptionError
 from syda_gym.evaluation.report.figures import Shape, Track
 from syda_gym.files import atomic_path
 
-__all__ = ["draw", "write_png", "write_video"]
+__all__ = ["draw", "write_png"]
 
 Image = NDArray[np.uint8]
 
@@ -89,44 +89,6 @@ def write_png(image: Image, path: str | os.PathLike[str]) -> Path:
 
     with atomic_path(path) as temporary:
         Pillow.fromarray(image).save(temporary, format="PNG", optimize=True)
-    return Path(path)
-
-
-def write_video(images: Iterable[Image], path: str | os.PathLike[str], fps: float) -> Path:
-    """Writes pictures of one size as an H.264 film, atomically.
-
-    Args:
-        images: ``(height, width, 3)`` uint8 each, with even sides.
-        path: ends in ``.mp4``.
-        fps: frames per second.
-
-    Raises:
-        StorageError: nothing to write, or the encoder failed.
-    """
-    import imageio_ffmpeg
-
-    frames = iter(images)
-    first = next(frames, None)
-    if first is None:
-        raise StorageError(f"no pictures for {path}; a film needs at least one")
-    with atomic_path(path) as temporary:
-        writer = imageio_ffmpeg.write_frames(
-            str(temporary),
-            (first.shape[1], first.shape[0]),
-            fps=fps,
-            codec="libx264",
-            macro_block_size=2,
-            output_params=["-crf", "22", "-movflags", "+faststart"],
-        )
-        try:
-            writer.send(None)
-            writer.send(np.ascontiguousarray(first))
-            for frame in frames:
-                writer.send(np.ascontiguousarray(frame))
-        except OSError as error:
-            raise StorageError(f"cannot write the film {path}: {error}") from error
-        finally:
-            writer.close()
     return Path(path)
 
 

@@ -51,6 +51,7 @@ def write_video(path: str | os.PathLike[str], pictures: Iterable[ArrayLike], fps
             quality=8,
             macro_block_size=2,
             ffmpeg_log_level="error",
+            output_params=["-movflags", "+faststart"],  # a browser can start before it has the whole file
         )
         try:
             writer.send(None)
