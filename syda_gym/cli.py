@@ -337,7 +337,9 @@ def transferability(
     motions: MotionsOption = "embedded",
     folds: Annotated[int, typer.Option(help="Groups of actions to hold out (`--validate`).", min=2)] = 4,
     max_hops: Annotated[int, typer.Option(help="Longest chain (`--validate`).", min=1)] = 3,
-    picture: Annotated[Path | None, typer.Option(help="Write clouds and regions of the first pair as PNG.")] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Write clouds and regions of the first pair (or the validation) as PNG.")
+    ] = None,
     seed: SeedOption = 0,
     as_json: JsonOption = False,
 ) -> None:
@@ -356,6 +358,10 @@ def transferability(
             study = measure_prediction(
                 motions, bodies=bodies or None, folds=folds, max_hops=max_hops, seed=seed, progress=tell
             )
+        if picture:
+            from syda_gym.evaluation.prediction_picture import prediction_png
+
+            write_bytes(picture, prediction_png(study))
         print_json(study.as_dict()) if as_json else print_table(prediction_table(study))
         return
     names = list(bodies or ("adult", "kid", "pepper", "nao"))

@@ -9,6 +9,7 @@ import pytest
 
 from syda_gym.errors import MotionError, OptionError
 from syda_gym.evaluation.prediction import validate
+from syda_gym.evaluation.prediction_picture import prediction_png
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
 
@@ -34,6 +35,10 @@ def test_every_route_is_scored_on_actions_that_no_link_has_seen(few: Motions) ->
         assert route.predicted["hops"] == -route.hops
     again = validate(few, **options)
     assert json.dumps(again.as_dict()) == json.dumps(study.as_dict())
+    picture = prediction_png(study, ("T", "measured"))
+    assert picture.startswith(b"\x89PNG")
+    with pytest.raises(OptionError, match="did you mean 'measured'"):
+        prediction_png(study, ("measure",))
     direct, around = (
         next(r for r in study.routes if r.bodies == b) for b in (("adult", "tall"), ("adult", "kid", "tall"))
     )
