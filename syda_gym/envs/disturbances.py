@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -85,6 +86,7 @@ _ALLOWED: dict[str, tuple[float, float]] = {
 }
 
 _LONGEST_DROPOUT = 10
+_WARM_UP = 24
 
 
 @dataclass(frozen=True)
@@ -296,7 +298,8 @@ def deliver(drawn: Drawn, first: int, last: int, start: int, dt: float, rng: np.
 
 def warm_up(drawn: Drawn, dt: float) -> int:
     """Packets before the episode that may still matter when it begins."""
-    return int(np.ceil((drawn.latency + drawn.latency_jitter) / dt)) + _LONGEST_DROPOUT
+    # At least a fixed number, so that all cells of the suite draw the same noise from the same seed.
+    return max(int(np.ceil((drawn.latency + drawn.latency_jitter) / dt)) + _LONGEST_DROPOUT, _WARM_UP)
 
 
 def freeze_elbow_yaw(robot: Robot, q: FloatArray, threshold: float) -> FloatArray:
@@ -305,7 +308,7 @@ def freeze_elbow_yaw(robot: Robot, q: FloatArray, threshold: float) -> FloatArra
     Args:
         robot: whose commands.
         q: joint angles ``(N, n)`` [rad] in time order.
-        threshold: on the sine of the angle between upper arm and forearm.
+        threshold: on the sine of the elbow's angle, counted from where the arm is straightest.
 
     Returns:
         ``(N, n)``.
@@ -313,17 +316,28 @@ def freeze_elbow_yaw(robot: Robot, q: FloatArray, threshold: float) -> FloatArra
     if threshold <= 0.0:
         return q
     result = q.copy()
-    bones = np.diff(robot.arm_points(q), axis=2)
-    bones /= np.linalg.norm(bones, axis=-1, keepdims=True)
-    sine = np.linalg.norm(np.cross(bones[:, :, 0], bones[:, :, 1]), axis=-1)
     for arm, columns in enumerate(robot.arm_slices):
         if columns.stop - columns.start < 4:
             continue  # no joint for the swivel of the elbow
-        yaw = columns.start + 2
-        bent = sine[:, arm] >= threshold
+        yaw, elbow = columns.start + 2, columns.start + 3
+        bent = np.abs(np.sin(q[:, elbow] - _straight_elbows(robot)[arm])) >= threshold
         bent[0] = True
         result[:, yaw] = q[_last_true(bent), yaw]
     return robot.clamp(result)
+
+
+@lru_cache(maxsize=16)
+def _straight_elbows(robot: Robot) -> tuple[float, ...]:
+    """Angle of each arm's fourth joint, the elbow, at which the arm reaches farthest [rad]."""
+    angles = []
+    for arm, columns in enumerate(robot.arm_slices):
+        elbow = min(columns.start + 3, columns.stop - 1)
+        q = np.repeat(np.clip(0.0, robot.lower, robot.upper)[None], 721, axis=0)
+        q[:, elbow] = np.linspace(robot.lower[elbow], robot.upper[elbow], 721)
+        points = robot.arm_points(q)[:, arm]
+        reach = np.linalg.norm(points[:, 2] - points[:, 0], axis=1)
+        angles.append(float(q[np.argmax(reach), elbow]))
+    return tuple(angles)
 
 
 def _correlated(fresh: FloatArray, correlation: float) -> FloatArray:

@@ -90,6 +90,10 @@ class ServoWorld:
         self._speed[:, index] = self._full_speed[:, 0] * conditions.speed
         self._kick[:, index] = self._constants.kick(conditions, dt)
 
+    def set_constants(self, constants: ServoConstants, index: int) -> None:
+        """Takes other constants than those that were fitted, for one robot."""
+        self._kick[:, index] = constants.kick(self._conditions[index], self.rates.physics_dt)
+
     def advance(self, commands: FloatArray) -> None:
         """Lets every robot follow its command ``(B, n)`` [rad] for one control step."""
         target = np.ascontiguousarray(commands.T)

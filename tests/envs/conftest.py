@@ -1,0 +1,17 @@
+"""A cheap environment: two bodies' motions from the generator, closed-form retargeting as the mapping."""
+
+from __future__ import annotations
+
+import pytest
+
+from syda_gym.motions.synthetic import generate
+
+
+@pytest.fixture(scope="session")
+def motions():
+    return generate(("adult", "kid", "pepper", "nao"), seed=4, actions=("wave_high", "reach_high_front"), variants=2)
+
+
+@pytest.fixture(scope="session")
+def cheap(motions):
+    return {"motions": motions, "mapping": "geometric", "preset": "fixed", "route": ("adult", "pepper")}
