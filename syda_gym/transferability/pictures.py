@@ -95,8 +95,10 @@ def clouds_png(
     bar.ax.set_title("M", fontsize=9)
     regions = _regions(a, b)
     cloud = figure.add_subplot(grid[0, 4], projection="3d")
-    for _, color, mask in regions:
-        _draw_cloud(cloud, a.centres(_far_half(mask, definition)), definition, color=color)
+    halves = [(color, a.centres(_far_half(mask, definition))) for _, color, mask in regions]
+    # One scatter for all regions: matplotlib sorts by depth within a scatter only.
+    colors = [color for color, points in halves for _ in points]
+    _draw_cloud(cloud, np.concatenate([points for _, points in halves]), definition, c=colors)
     _dress_cloud(cloud, f"where {result.target} can stand in for {result.source}", definition)
     flat = figure.add_subplot(grid[1, 4])
     _draw_regions(flat, regions, a)
