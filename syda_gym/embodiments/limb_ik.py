@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -35,6 +37,8 @@ class LimbIK:
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self._arms = tuple(_ArmIK(robot, index, chain) for index, chain in enumerate(robot.chains))
+        single = [arm.single for arm in self._arms if arm.single is not None]
+        self._single = tuple(single) if len(single) == len(self._arms) else ()
 
     def solve(self, directions: ArrayLike) -> FloatArray:
         """Joint angles whose limb directions are nearest to the wanted ones.
@@ -57,20 +61,29 @@ class LimbIK:
         if not np.isfinite(wanted).all() or (norms < 1e-9).any():
             raise EmbodimentError(f"directions for {self.robot.name!r} must be finite and longer than zero")
         unit = wanted / norms
-        if len(unit) == 1 and all(arm.single is not None for arm in self._arms):
-            return self._solve_one(unit[0])
+        if len(unit) == 1 and self._single:
+            return self.solve_frame(unit[0].tolist())[None]
         frames = np.repeat(self.robot.rest[None], len(unit), axis=0)
         for index, arm in enumerate(self._arms):
             frames = arm.solve(frames, unit[:, index])
         return frames
 
-    def _solve_one(self, unit: FloatArray) -> FloatArray:
-        """The same for one frame, directions ``(arms, 2, 3)``, without numpy's overhead."""
+    def solve_frame(self, directions: Sequence[Sequence[Sequence[float]]]) -> FloatArray:
+        """The same for one frame, without numpy's overhead where the arms allow it.
+
+        Args:
+            directions: arms, limbs, xyz as nested sequences of floats; finite and longer than zero.
+
+        Returns:
+            One frame ``(n,)`` [rad].
+        """
+        if not self._single:
+            whole: FloatArray = self.solve(np.array([directions]))[0]
+            return whole
         angles: list[float] = []
-        for arm, (upper, fore) in zip(self._arms, unit.tolist(), strict=True):
-            assert arm.single is not None  # the caller looked; for the type checker
-            angles += arm.single.solve(tuple(upper), tuple(fore))
-        return self.robot.clamp(np.array(angles))
+        for single, (upper, fore) in zip(self._single, directions, strict=True):
+            angles += single.solve(_unit_vector(upper), _unit_vector(fore))
+        return np.array(angles)
 
 
 class _ArmIK:
@@ -263,6 +276,12 @@ def _into_range(angle: FloatArray, lower: float, upper: float) -> FloatArray:
     middle = 0.5 * (lower + upper)
     nearest: FloatArray = middle + (angle - middle + np.pi) % (2.0 * np.pi) - np.pi
     return nearest
+
+
+def _unit_vector(vector: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = vector
+    norm = math.sqrt(x * x + y * y + z * z)
+    return x / norm, y / norm, z / norm
 
 
 def _unit(vector: FloatArray) -> FloatArray:

@@ -7,12 +7,12 @@ takes a tenth of a millisecond here. Live teleoperation maps one frame at a time
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Sequence
 
 import numpy as np
 
 from syda_gym.embodiments.arm_chain import ArmChain
+from syda_gym.embodiments.coupled import coupled_range
 from syda_gym.embodiments.embodiment import FloatArray
 
 __all__ = ["SingleArmIK"]
@@ -54,6 +54,7 @@ class SingleArmIK:
         self.rest: list[float] = rest.tolist()
         self.lower: list[float] = chain.lower.tolist()
         self.upper: list[float] = chain.upper.tolist()
+        self.middle = [0.5 * (low + high) for low, high in zip(self.lower, self.upper, strict=True)]
         self.axes: list[Vector] = [tuple(axis) for axis in axes.tolist()]
         self.upper_zero: Vector = tuple(zero[0].tolist())
         self.fore_zero: Vector = tuple(zero[1].tolist())
@@ -63,22 +64,55 @@ class SingleArmIK:
         self.exact = self._is_exact()
 
     def solve(self, upper: Vector, fore: Vector) -> list[float]:
-        """Joint angles [rad] of the arm for unit directions of upper arm and forearm in the torso frame."""
-        candidates = self._candidates(upper, fore)
-        clamped = [self._clamped(angles) for angles, _ in candidates]
+        """Joint angles [rad] of the arm, within its limits.
+
+        Args:
+            upper: unit direction of the upper arm in the torso frame.
+            fore: unit direction of the forearm.
+        """
         if self.exact:
-            solved = [a for (b, real), a in zip(candidates, clamped, strict=True) if real and a == b]
-            if solved:
-                return min(solved, key=self._pull)
+            solved = self._solved(upper, fore)
+            if solved is not None:
+                return solved
         goal_elbow = _scaled(upper, self.lengths[0])
         goal = (*goal_elbow, *_sum(goal_elbow, _scaled(fore, self.lengths[1])))
         best, least, miss = self.rest, math.inf, math.inf
-        for angles in clamped:
+        for candidate, _ in self._candidates(upper, fore):
+            angles = self._clamped(candidate)
             error = math.sqrt(_squared(_residual(_sweep(self._plan, angles)[0], goal)))
             score = error + self._pull(angles)
             if score < least:
                 best, least, miss = angles, score, error
         return best if miss <= _EXACT else self._refine(best, goal)
+
+    def _solved(self, upper: Vector, fore: Vector) -> list[float] | None:
+        """Of the closed-form solutions within the limits the one nearest to rest; most frames need nothing else."""
+        w0, w1, w2, w3 = (self.axes[joint] for joint in self.movers)
+        j0, j1, j2, j3 = self.movers
+        best, least = None, math.inf
+        for first in (1.0, -1.0):
+            a0, a1, real = _subproblem_two(w0, w1, self.upper_zero, upper, first)
+            b0, b1 = self._wrapped(j0, a0), self._wrapped(j1, a1)
+            if not real or b0 is None or b1 is None:
+                continue
+            turned = _turned(w1, -a1, _turned(w0, -a0, fore))
+            for second in (1.0, -1.0):
+                a2, a3, real = _subproblem_two(w2, w3, self.fore_zero, turned, second)
+                b2, b3 = self._wrapped(j2, a2), self._wrapped(j3, a3)
+                if not real or b2 is None or b3 is None:
+                    continue
+                angles = self.rest.copy()
+                angles[j0], angles[j1], angles[j2], angles[j3] = b0, b1, b2, b3
+                pull = self._pull(angles)
+                if pull < least and (not self.couplings or self._clamped(angles) == angles):
+                    best, least = angles, pull
+        return best
+
+    def _wrapped(self, joint: int, angle: float) -> float | None:
+        """The angle by whole turns in the joint's range; ``None`` if there is no such."""
+        middle = self.middle[joint]
+        angle = middle + (angle - middle + math.pi) % (2.0 * math.pi) - math.pi
+        return angle if self.lower[joint] <= angle <= self.upper[joint] else None
 
     def _is_exact(self) -> bool:
         """Whether the closed form leaves no error: the last two movers then turn the forearm about the elbow."""
@@ -109,7 +143,7 @@ class SingleArmIK:
                 angles = self.rest.copy()
                 angles[j0], angles[j1], angles[j2], angles[j3] = a0, a1, a2, a3
                 for joint in self.movers:
-                    middle = 0.5 * (self.lower[joint] + self.upper[joint])
+                    middle = self.middle[joint]
                     angles[joint] = middle + (angles[joint] - middle + math.pi) % (2.0 * math.pi) - math.pi
                 found.append((angles, real_upper and real_fore))
         return found
@@ -119,7 +153,7 @@ class SingleArmIK:
             return self.lower, self.upper
         lower, upper = self.lower.copy(), self.upper.copy()
         for joint, by, at, low, high in self.couplings:
-            a, b = _interpolated(angles[by], at, low, high)
+            a, b = coupled_range(angles[by], at, low, high)
             lower[joint], upper[joint] = max(lower[joint], a), min(upper[joint], b)
         return lower, upper
 
@@ -356,16 +390,6 @@ def _turned(axis: Vector, angle: float, vector: Vector) -> Vector:
         vector[1] * c + y * s + axis[1] * along,
         vector[2] * c + z * s + axis[2] * along,
     )
-
-
-def _interpolated(angle: float, at: list[float], low: list[float], high: list[float]) -> tuple[float, float]:
-    if angle <= at[0]:
-        return low[0], high[0]
-    if angle >= at[-1]:
-        return low[-1], high[-1]
-    i = bisect_right(at, angle) - 1
-    share = (angle - at[i]) / (at[i + 1] - at[i])
-    return low[i] + share * (low[i + 1] - low[i]), high[i] + share * (high[i + 1] - high[i])
 
 
 def _dot(a: Vector, b: Vector) -> float:

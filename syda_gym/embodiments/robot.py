@@ -14,6 +14,7 @@ import yaml
 from numpy.typing import ArrayLike, NDArray
 
 from syda_gym.embodiments.arm_chain import ArmChain
+from syda_gym.embodiments.coupled import coupled_range
 from syda_gym.embodiments.embodiment import SIDES, Embodiment, Feature, FloatArray, Side
 from syda_gym.embodiments.urdf import arm_chain, read_urdf
 from syda_gym.errors import EmbodimentError, nearest_name
@@ -227,9 +228,28 @@ class Robot(Embodiment):
 
     def clamp(self, frames: ArrayLike) -> FloatArray:
         """Nearest frames within the joint limits, coupled limits included (the governing joint is clamped first)."""
+        if np.size(frames) == len(self.joint_names):
+            return np.array([self._clamped(np.asarray(frames, dtype=np.float64).ravel().tolist())])
         q = np.clip(np.atleast_2d(np.asarray(frames, dtype=np.float64)), self.lower, self.upper)
         lower, upper = self.limits_at(q)
         return np.clip(q, lower, upper)
+
+    def _clamped(self, angles: list[float]) -> list[float]:
+        """``clamp`` for one frame in plain floats, which live teleoperation does several times a frame."""
+        lower, upper, couplings = self._plain_limits
+        inside = [min(max(a, low), high) for a, low, high in zip(angles, lower, upper, strict=True)]
+        result = inside.copy()
+        for joint, by, at, low, high in couplings:
+            least, most = coupled_range(inside[by], at, low, high)
+            result[joint] = min(max(result[joint], lower[joint], least), upper[joint], most)
+        return result
+
+    @cached_property
+    def _plain_limits(
+        self,
+    ) -> tuple[list[float], list[float], list[tuple[int, int, list[float], list[float], list[float]]]]:
+        couplings = [(j, by, at.tolist(), low.tolist(), high.tolist()) for j, by, at, low, high in self._coupled]
+        return self.lower.tolist(), self.upper.tolist(), couplings
 
     def violations(self, frames: ArrayLike, tolerance: float = 1e-9) -> NDArray[np.bool_]:
         """Which joint angles lie outside their limits by more than ``tolerance`` [rad], ``(N, n)``."""

@@ -155,6 +155,7 @@ class RobotArmCoder(Coder):
         self._arms = [body.sides.index(side) for side in self.sides]
         self._signs = np.array([_MIRROR if side == "right" else np.ones(3) for side in self.sides])
         self.rest = _shaped(arrays, "rest", (body.n_features,))
+        self._lateral: list[float] = self._signs[:, 1].tolist()
         self._ik = LimbIK(body)
         self._extra, self._extra_signs = self._extra_columns()
 
@@ -181,6 +182,8 @@ class RobotArmCoder(Coder):
 
     def decode(self, codes: FloatArray) -> FloatArray:
         """Joint angles ``(N, n)`` within the limits."""
+        if len(codes) == 1:
+            return self._decode_one(codes[0])
         limbs = codes[..., :6].reshape(*codes.shape[:2], 2, 3)
         # A vanishing direction (a model that knows nothing) becomes a hanging arm rather than a division by zero.
         limbs = np.where(np.sum(limbs**2, axis=-1, keepdims=True) < 1e-12, [0.0, 0.0, -1.0], limbs)
@@ -194,6 +197,21 @@ class RobotArmCoder(Coder):
             frames[:, part] = solved[:, part]
         frames[:, self._extra] = codes[..., 6:] * self._extra_signs
         return self.robot.clamp(frames)
+
+    def _decode_one(self, codes: FloatArray) -> FloatArray:
+        """The same for one frame, codes ``(arms, 6 + extras)``; live teleoperation decodes frame by frame."""
+        wanted = [[[0.0, 0.0, -1.0], [0.0, 0.0, -1.0]] for _ in self.robot.sides]
+        for arm, sign, row in zip(self._arms, self._lateral, codes.tolist(), strict=True):
+            for limb in (0, 1):
+                x, y, z = row[3 * limb : 3 * limb + 3]
+                if x * x + y * y + z * z >= 1e-12:
+                    wanted[arm][limb] = [x, y * sign, z]
+        solved, frame = self._ik.solve_frame(wanted), self.rest.copy()
+        for arm in self._arms:
+            part = self.robot.arm_slices[arm]
+            frame[part] = solved[part]
+        frame[self._extra] = codes[:, 6:] * self._extra_signs
+        return self.robot.clamp(frame)
 
     def arrays(self) -> Arrays:
         """The pose of arms that are not coded."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
 
+from syda_gym.embodiments.coupled import coupled_range
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import CoupledLimit, Robot
 from syda_gym.errors import OptionError
@@ -94,15 +94,7 @@ class _Coupled:
 
     def range(self, governor: float) -> tuple[float, float]:
         """Lower and upper limit of the joint at an angle of its governor."""
-        at = self.row.at
-        if governor <= at[0]:
-            return self.row.lower[0], self.row.upper[0]
-        if governor >= at[-1]:
-            return self.row.lower[-1], self.row.upper[-1]
-        i = bisect_right(at, governor) - 1
-        share = (governor - at[i]) / (at[i + 1] - at[i])
-        low, high = self.row.lower, self.row.upper
-        return low[i] + share * (low[i + 1] - low[i]), high[i] + share * (high[i + 1] - high[i])
+        return coupled_range(governor, self.row.at, self.row.lower, self.row.upper)
 
     def holds(self, q: FloatArray) -> bool:
         low, high = self.range(float(q[self.by]))

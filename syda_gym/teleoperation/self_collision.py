@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -173,9 +174,11 @@ class SelfCollision:
         names = [self._model.frames[shape.parentFrame].name for shape in shapes.geometryObjects]
         joints = [shape.parentJoint for shape in shapes.geometryObjects]
         parents = self._model.parents
+        within_reach = self._within_reach()
         self._keep(
             [
-                frozenset((names[pair.first], names[pair.second])) not in disabled
+                within_reach(pair.first, pair.second)
+                and frozenset((names[pair.first], names[pair.second])) not in disabled
                 and parents[joints[pair.first]] != joints[pair.second]
                 and parents[joints[pair.second]] != joints[pair.first]
                 for pair in shapes.collisionPairs
@@ -196,6 +199,36 @@ class SelfCollision:
             )
         )
         self._keep(list(~left_out))
+
+    def _within_reach(self) -> Callable[[int, int], bool]:
+        """Tells which pairs can meet at all: each shape stays in a ball about the first joint of its arm.
+
+        The ball's radius is the length of the arm's links up to the shape plus the shape's own size, whatever the joint
+        angles, so that nothing is lost by leaving out pairs whose balls are apart.
+        """
+        model, zero = self._model, np.zeros(3)
+        lengths, roots = [0.0], [0]
+        for joint in range(1, model.njoints):
+            parent = model.parents[joint]
+            roots.append(joint if parent == 0 else roots[parent])
+            step = float(np.linalg.norm(model.jointPlacements[joint].translation))
+            lengths.append(0.0 if parent == 0 else lengths[parent] + step)
+        balls = []
+        for shape in self._shapes.geometryObjects:
+            shape.geometry.computeLocalAABB()
+            middle = shape.placement.act(np.array(shape.geometry.aabb_center))
+            radius = float(shape.geometry.aabb_radius)
+            if shape.parentJoint == 0:
+                balls.append((middle, radius))
+            else:
+                root = model.jointPlacements[roots[shape.parentJoint]].act(zero)
+                balls.append((root, lengths[shape.parentJoint] + float(np.linalg.norm(middle)) + radius))
+
+        def meet(first: int, second: int) -> bool:
+            (a, r), (b, s) = balls[first], balls[second]
+            return bool(np.linalg.norm(a - b) <= r + s + self.margin)
+
+        return meet
 
     def _keep(self, chosen: list[bool]) -> None:
         """Keeps only the chosen pairs of shapes and renews the buffers that depend on them."""
