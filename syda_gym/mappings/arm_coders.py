@@ -6,6 +6,7 @@ relative to the shoulder in units of the arm's length, and unit limb directions.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -61,6 +62,8 @@ class HumanArmCoder(Coder):
         self.lengths = _shaped(arrays, "lengths", (2,))
         self.shoulder = _shaped(arrays, "shoulder", (3,))
         self.rest = _shaped(arrays, "rest", (len(body.sides), 3, 3))
+        self._lateral: list[float] = self._signs[:, 1].tolist()
+        self._size, self._middle = float(self.lengths.sum()), self.shoulder.tolist()
 
     @classmethod
     def fit(cls, body: HumanSkeleton, frames: FloatArray, sides: Sequence[Side], placed: bool = False) -> HumanArmCoder:
@@ -87,6 +90,8 @@ class HumanArmCoder(Coder):
 
     def encode(self, frames: FloatArray) -> FloatArray:
         """Codes ``(N, arms, 12)``, or 15 numbers for a placed code."""
+        if len(frames) == 1:
+            return self._encode_one(frames[0])
         points = _facing_forward(self.human.arm_points(frames))[:, self._arms] * self._signs[:, None]
         elbow = points[:, :, 1] - points[:, :, 0]
         hand = points[:, :, 2] - points[:, :, 0]
@@ -108,6 +113,30 @@ class HumanArmCoder(Coder):
             ],
             axis=-1,
         )
+
+    def _encode_one(self, frame: FloatArray) -> FloatArray:
+        """The same for one frame ``(F,)`` in plain floats; live teleoperation encodes frame by frame."""
+        points = (frame.reshape(-1, 3) @ self.human.axes.T).tolist()
+        cos, sin = _heading(points) if len(points) == 6 else (1.0, 0.0)
+        rows, total = [], 0.0
+        for arm, sign in zip(self._arms, self._lateral, strict=True):
+            (sx, sy, sz), (ex, ey, ez), (hx, hy, hz) = (
+                (cos * x - sin * y, (sin * x + cos * y) * sign, z) for x, y, z in points[3 * arm : 3 * arm + 3]
+            )
+            upper, fore, hand = (ex - sx, ey - sy, ez - sz), (hx - ex, hy - ey, hz - ez), (hx - sx, hy - sy, hz - sz)
+            long_upper, long_fore = math.hypot(*upper), math.hypot(*fore)
+            total += long_upper + long_fore
+            rows.append(((sx, sy, sz), upper, hand, fore, max(long_upper, _SHORTEST), max(long_fore, _SHORTEST)))
+        size = self._size if self.placed else max(total / len(rows), _SHORTEST)
+        codes = []
+        for shoulder, upper, hand, fore, long_upper, long_fore in rows:
+            code = [v / size for v in (*upper, *hand)]
+            code += [v / long_upper for v in upper]
+            code += [v / long_fore for v in fore]
+            if self.placed:
+                code = [(v - m) / size for v, m in zip(shoulder, self._middle, strict=True)] + code
+            codes.append(code)
+        return np.array([codes])
 
     def decode(self, codes: FloatArray) -> FloatArray:
         """Frames ``(N, F)``: the mean of scaled positions and of limbs of fixed length along the directions."""
@@ -283,6 +312,13 @@ def _facing_forward(points: FloatArray) -> FloatArray:
     sin = np.where(usable, line[:, 0] / np.where(usable, flat, 1.0), 0.0)[:, None, None]
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
     return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-1)
+
+
+def _heading(points: list[list[float]]) -> tuple[float, float]:
+    """Cosine and sine of the turn that ``_facing_forward`` makes, for the six points of one frame."""
+    x, y = points[0][0] - points[3][0], points[0][1] - points[3][1]
+    flat = math.hypot(x, y)
+    return (y / flat, x / flat) if flat > 0.02 else (1.0, 0.0)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
