@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 
 import numpy as np
 import pytest
@@ -134,7 +135,10 @@ MUTATED = st.builds(
 ANYTHING = st.binary(max_size=300) | MUTATED | ALMOST.map(lambda v: json.dumps(v).encode())
 
 
-@settings(max_examples=400, deadline=None)
+FUZZ = os.environ.get("SYDA_GYM_FUZZ")  # number of inputs for a long run; the suite takes a small seeded set
+
+
+@settings(max_examples=int(FUZZ or 400), deadline=None, derandomize=FUZZ is None)
 @given(data=ANYTHING)
 def test_whatever_arrives_gives_a_sound_packet_or_a_packet_error(data: bytes) -> None:
     body = catalog.get("adult")

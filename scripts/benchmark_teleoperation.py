@@ -1,0 +1,312 @@
+"""Measures live teleoperation against its bars: latency, speed against mink, violations, a bad network, memory.
+
+    python scripts/benchmark_teleoperation.py latency --frames 10000 --rate 30
+    python scripts/benchmark_teleoperation.py throughput
+    python scripts/benchmark_teleoperation.py violations --data FOLDER
+    python scripts/benchmark_teleoperation.py network --hours 1
+
+``FOLDER`` holds ``paper``, ``kinect`` and ``bvh``. Every part prints one JSON object. Pin the process to one core, for
+example with ``taskset -c 1``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import os
+import socket
+import tempfile
+import time
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from syda_gym.embodiments import catalog
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.human import HumanSkeleton
+from syda_gym.embodiments.robot import Robot
+from syda_gym.mappings.mapping import Mapping
+from syda_gym.motions.clip import MotionClip
+from syda_gym.motions.loading import load_motions
+from syda_gym.teleoperation import LoopSettings, TeleoperationLoop, Tick, UdpSink, UdpSource, run
+from syda_gym.teleoperation.choosing import choose_mapping, geometric_mapping
+from syda_gym.teleoperation.inbox import Inbox
+from syda_gym.teleoperation.journal import Journal, replay_journal
+from syda_gym.teleoperation.ordering import Ordering
+from syda_gym.teleoperation.packets import PacketDecoder, PacketError, encode_frame
+from syda_gym.teleoperation.statistics import LiveStatistics
+
+
+def main() -> None:
+    """Runs the part that was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("part", choices=["latency", "throughput", "violations", "network"])
+    parser.add_argument("--frames", type=int, default=10_000)
+    parser.add_argument("--rate", type=float, default=30.0)
+    parser.add_argument("--hours", type=float, default=1.0)
+    parser.add_argument("--data", type=Path)
+    parser.add_argument("--mapping", default="syda")
+    parser.add_argument("--route", default="auto", help="auto, or bodies such as adult,kid,pepper")
+    args = parser.parse_args()
+    parts = {"latency": latency, "throughput": throughput, "violations": violations, "network": network}
+    print(json.dumps(parts[args.part](args), indent=1))
+
+
+def chosen(args: argparse.Namespace) -> Mapping:
+    """The mapping that the arguments name."""
+    route = "auto" if args.route == "auto" else tuple(args.route.split(","))
+    return choose_mapping("adult", "pepper", mapping=args.mapping, route=route)[0]
+
+
+def operator_frames(count: int) -> FloatArray:
+    """Frames of the embedded adult, as many as wanted."""
+    frames = np.concatenate([clip.frames for clip in load_motions("embedded").clips("adult")])
+    return frames[np.arange(count) % len(frames)]
+
+
+def latency(args: argparse.Namespace) -> dict[str, Any]:
+    """UDP to UDP over loopback in real time, sender and receiver in processes of their own."""
+    mapping = chosen(args)
+    loop = TeleoperationLoop(mapping, LoopSettings(rate=args.rate, calibration=0.0))
+    stats = LiveStatistics(window=args.frames)
+    source = UdpSource(mapping.source, port=0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", 0))
+        with source, UdpSink(loop.robot, port=listener.getsockname()[1]) as sink:
+            sender = multiprocessing.get_context("spawn").Process(
+                target=_send, args=(source.port, operator_frames(args.frames), args.rate)
+            )
+            sender.start()
+            run(
+                source,
+                loop,
+                sink,
+                statistics=stats,
+                seconds=args.frames / args.rate + 5.0,
+                rest_at_end=False,
+            )
+            sender.join()
+    summary = stats.summary()
+    return {
+        "route": mapping.route,
+        "method": mapping.method,
+        "rate_hz": args.rate,
+        "load_average": os.getloadavg()[0],
+        "latency_p90_ms": 1e3 * stats.percentile(90),
+        **summary,
+    }
+
+
+def _send(port: int, frames: FloatArray, rate: float) -> None:
+    time.sleep(1.0)
+    begun = time.monotonic()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        for index, frame in enumerate(frames):
+            time.sleep(max(0.0, begun + index / rate - time.monotonic()))
+            sock.sendto(encode_frame(index, index / rate, frame), ("127.0.0.1", port))
+
+
+def throughput(args: argparse.Namespace) -> dict[str, Any]:
+    """Frames per second of the whole loop with different mappings; mink is the rival."""
+    from syda_gym.mappings.fitting import fit
+
+    frames = operator_frames(600)
+    pair = load_motions("embedded", fps=5.0).pair("adult", "pepper")
+    mappings = {
+        "syda adult>pepper": choose_mapping("adult", "pepper")[0],
+        "syda adult>kid>pepper": choose_mapping("adult", "pepper", route=("adult", "kid", "pepper"))[0],
+        "geometric": choose_mapping("adult", "pepper", mapping="geometric")[0],
+        "mink": fit(pair, method="mink"),
+    }
+    result: dict[str, Any] = {"load_average": os.getloadavg()[0]}
+    for name, mapping in mappings.items():
+        spent = []
+        loop = TeleoperationLoop(mapping, LoopSettings(calibration=0.0))
+        for index, frame in enumerate(frames):
+            tick = Tick(index / 30.0, frame, index / 30.0)
+            before = time.thread_time()  # of this thread alone, so that other processes do not count
+            loop.step(tick)
+            spent.append(time.thread_time() - before)
+        result[name] = {
+            "frames_per_second": len(spent) / sum(spent),
+            "p50_ms": 1e3 * float(np.percentile(spent, 50)),
+            "p99_ms": 1e3 * float(np.percentile(spent, 99)),
+        }
+    rival = result["mink"]["frames_per_second"]
+    for name in list(mappings)[:-1]:
+        result[name]["times_mink"] = result[name]["frames_per_second"] / rival
+    return result
+
+
+def violations(args: argparse.Namespace) -> dict[str, Any]:
+    """Joint-limit and speed-limit violations of the commands on every recording and on random walks."""
+    result: dict[str, Any] = {}
+    for robot_name in ("pepper", "nao"):
+        robot = catalog.get(robot_name)
+        assert isinstance(robot, Robot)
+        for label, clips in _recordings(args.data).items():
+            mapping = geometric_mapping(clips[0].body, robot)
+            total = np.zeros(5, dtype=np.int64)
+            for clip in clips:
+                times = (
+                    np.arange(len(clip)) / clip.fps if clip.timestamps is None else clip.timestamps - clip.timestamps[0]
+                )
+                total += _count(mapping, robot, times, clip.frames)
+            result[f"{label} > {robot_name}"] = _named(total)
+        fitted = choose_mapping("adult", robot_name)[0]
+        walk = _random_walk(fitted.source, 20_000)
+        result[f"random walk, {fitted.method} > {robot_name}"] = _named(
+            _count(fitted, robot, np.arange(len(walk)) / 30.0, walk)
+        )
+    return result
+
+
+def _recordings(data: Path | None) -> dict[str, list[MotionClip]]:
+    found: dict[str, list[MotionClip]] = {}
+    sources = ["embedded"] if data is None else [f"paper:{data / 'paper'}", *map(str, sorted(data.glob("[kb]*/*.*")))]
+    for source in sources:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            motions = load_motions(source)
+        for name, body in motions.bodies.items():
+            if isinstance(body, HumanSkeleton):
+                found[f"{motions.name} {name}"] = list(motions.clips(name))
+    return found
+
+
+def _random_walk(body: Any, count: int) -> FloatArray:
+    """Limbs that turn at random, now and then at once; every frame is a possible body."""
+    rng = np.random.default_rng(0)
+    points = np.repeat(body.arm_points(body.standing()), count, axis=0)
+    limbs = np.cumsum(rng.normal(scale=0.25, size=(count, len(body.sides), 2, 3)), axis=0)
+    limbs[rng.random(count) < 0.02] = rng.normal(size=3)
+    limbs *= body.arm_lengths[..., None] / np.linalg.norm(limbs, axis=-1, keepdims=True)
+    points[:, :, 1] = points[:, :, 0] + limbs[:, :, 0]
+    points[:, :, 2] = points[:, :, 1] + limbs[:, :, 1]
+    frames: FloatArray = body.frames_from_points(points)
+    return frames
+
+
+def _count(mapping: Mapping, robot: Robot, times: FloatArray, frames: FloatArray) -> np.ndarray[Any, Any]:
+    """Commands, limit violations, speed violations, self-collisions, frames used."""
+    loop = TeleoperationLoop(mapping, LoopSettings(calibration=0.0, soft_start=0.0))
+    decisions = [loop.step(Tick(float(t), frame, float(t))) for t, frame in zip(times, frames, strict=True)]
+    path = np.array([decision.command for decision in decisions])
+    rate = np.abs(np.diff(path, axis=0)) / np.maximum(np.diff(times)[:, None], 1e-12)
+    check = loop._collision
+    touching = sum(check.touches(q) for q in path[:: max(1, len(path) // 500)]) if check is not None else 0
+    return np.array(
+        [
+            len(path),
+            robot.violations(path, 0.0).sum(),
+            (rate > robot.speed * (1 + 1e-12)).sum(),
+            touching,
+            sum(decision.frame_used for decision in decisions),
+        ]
+    )
+
+
+def _named(total: np.ndarray[Any, Any]) -> dict[str, int]:
+    names = ("commands", "limit_violations", "speed_violations", "self_collisions", "frames_used")
+    return dict(zip(names, total.tolist(), strict=True))
+
+
+def network(args: argparse.Namespace) -> dict[str, Any]:
+    """An hour of a network that loses 30 %, doubles, reorders and sends garbage, in simulated time."""
+    mapping = chosen(args)
+    loop, decoder, ordering, inbox = _receiver(mapping)
+    now, sizes, count, refused, before = 0.0, [], 0, 0, loop.command
+    limit = speed = 0
+    robot = loop.robot
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "run.jsonl.gz"
+        with Journal(path, loop) as journal:
+            began = time.perf_counter()
+            for number, packets in enumerate(_bad_stream(operator_frames(3000), int(args.hours * 108_000))):
+                last, now = now, number / 30.0
+                for data in packets:
+                    try:
+                        packet = decoder(data)
+                        reason = ordering.admit(packet, now)
+                        if reason:
+                            raise PacketError(reason, reason)
+                        inbox.put(packet, now)
+                    except PacketError as error:
+                        inbox.drop(error.reason)
+                        refused += 1
+                received = inbox.take(0.0)
+                packet_in = received.packet
+                tick = Tick(
+                    now,
+                    None if packet_in is None else packet_in.frame,
+                    None if packet_in is None else packet_in.sent,
+                    controls=received.controls,
+                )
+                decision = loop.step(tick)
+                journal.decided(tick, decision)
+                count += packet_in is not None
+                limit += int(robot.violations(decision.command, 0.0).sum())
+                speed += int((np.abs(decision.command - before) > robot.speed * (now - last) + 1e-15).sum())
+                before = decision.command
+                if number % 9000 == 0:
+                    sizes.append(_resident())
+            took = time.perf_counter() - began
+        journal_mb = path.stat().st_size / 2**20
+        replay = replay_journal(path, mapping)
+    return {
+        "hours": args.hours,
+        "frames_accepted": count,
+        "packets_refused": refused,
+        "refused_by_reason": dict(inbox.dropped),
+        "limit_violations": limit,
+        "speed_violations": speed,
+        "resident_mb_every_5_minutes": sizes,
+        "journal_mb": journal_mb,
+        "replayed_decisions": replay.ticks,
+        "replayed_bit_for_bit": replay.exact,
+        "seconds": took,
+    }
+
+
+def _receiver(mapping: Mapping) -> tuple[TeleoperationLoop, PacketDecoder, Ordering, Inbox]:
+    loop = TeleoperationLoop(mapping, LoopSettings(calibration=0.0))
+    return loop, PacketDecoder(mapping.source), Ordering(), Inbox()
+
+
+def _bad_stream(frames: FloatArray, count: int) -> Iterator[list[bytes]]:
+    """What arrives in each thirtieth of a second."""
+    rng, late = np.random.default_rng(0), b""
+    junk = [b"", b"{", b"\xff" * 40, b"x" * 20_000, b'{"v":1,"seq":5,"t":1,"frame":[NaN]}', b"[" * 9000, b"{}" * 50]
+    for index in range(count):
+        packets = []
+        good = encode_frame(index, index / 30.0, frames[index % len(frames)])
+        chance = rng.random(5)
+        if chance[0] > 0.3:
+            packets.append(good)
+        if chance[1] < 0.1:
+            packets.append(good)
+        if chance[2] < 0.1 and late:
+            packets.insert(0, late)
+        if chance[3] < 0.1:
+            packets.append(junk[int(rng.integers(len(junk)))])
+        if chance[4] < 0.1:
+            broken = bytearray(good)
+            broken[int(rng.integers(len(broken)))] = int(rng.integers(256))
+            packets.append(bytes(broken))
+        late = good
+        # An outage of two to five seconds a minute, so that holding, easing and waking up are part of the hour.
+        yield [] if index % 1800 > 1800 - rng.integers(60, 150) else packets
+
+
+def _resident() -> float:
+    """Resident memory of this process [MB]."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return round(pages * os.sysconf("SC_PAGE_SIZE") / 2**20, 1)
+
+
+if __name__ == "__main__":
+    main()
