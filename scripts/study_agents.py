@@ -58,7 +58,7 @@ class Size:
     tuning_episodes: int = 40
     validation_episodes: int = 40
     budget: int = 20
-    iterations: int = 320
+    iterations: int = 400
     steps: int = 200_000
     test_variants: int = 2
 

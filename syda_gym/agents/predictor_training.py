@@ -15,7 +15,7 @@ from syda_gym.agents.figures import JOINT_WEIGHT, Figures
 from syda_gym.agents.interface import Interface, lag_share
 from syda_gym.agents.predictor import Predictor, network_inputs
 from syda_gym.agents.streams import Streams, play_streams, read_stream, score_streams
-from syda_gym.agents.tcn import DILATIONS, TcnShape
+from syda_gym.agents.tcn import DILATIONS, TcnShape, receptive_field
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import AgentError
 from syda_gym.simulation.rates import Rates
@@ -33,7 +33,8 @@ class PredictorConfig:
     Attributes:
         channels: width of the network.
         iterations: optimiser steps.
-        batch: episodes per step.
+        batch: stretches of episodes per step.
+        window: control steps of a stretch; the network is shown the steps before it as well.
         learning_rate: at the start; it falls along a cosine.
         weight_decay: of AdamW.
         jitter_weight: of the jitter against the landmark error; 1 trains on the objective ``J`` itself.
@@ -45,18 +46,19 @@ class PredictorConfig:
     """
 
     channels: int = 48
-    iterations: int = 480
+    iterations: int = 400
     batch: int = 32
+    window: int = 64
     learning_rate: float = 3e-3
     weight_decay: float = 1e-3
     jitter_weight: float = 1.0
     strength: float = 1.0
     bound: float = 0.6
-    rounds: int = 6
+    rounds: int = 3
     mirror: bool = True
 
     def __post_init__(self) -> None:
-        for name in ("channels", "iterations", "batch", "rounds"):
+        for name in ("channels", "iterations", "batch", "window", "rounds"):
             if getattr(self, name) < 1:
                 raise AgentError(f"predictor: {name} must be at least 1, got {getattr(self, name)}")
         if self.rounds > self.iterations:
@@ -146,7 +148,7 @@ class _Trainer:
         self._schedule = torch.optim.lr_scheduler.CosineAnnealingLR(self._optimiser, config.iterations)
         self._below = commands_below(base, self.streams)
         self._kinematics = TorchLandmarks(self.interface)
-        self._start = torch.as_tensor(self.streams.base[:, 0], dtype=torch.float32)
+        self._before = torch.zeros(0)
         self._reference = torch.as_tensor(self.streams.reference, dtype=torch.float32)
         with torch.no_grad():
             self._targets = torch.stack([self._kinematics(reference) for reference in self._reference])
@@ -173,35 +175,41 @@ class _Trainer:
         last = np.concatenate([self._below[:, :1], self._below[:, :-1]], axis=1)
         inputs = network_inputs(self.interface, self._below, last, before, self.streams.age)
         self._inputs = torch.as_tensor(inputs, dtype=torch.float32)
+        self._before = torch.as_tensor(before, dtype=torch.float32)
 
     def run(self, iterations: int) -> None:
         """Optimises for some iterations."""
         import torch
 
         for _ in range(iterations):
-            rows = torch.as_tensor(
-                self._rng.choice(len(self.streams), min(self.config.batch, len(self.streams)), False)
-            )
-            loss = self._loss(rows)
+            rows = self._rng.choice(len(self.streams), min(self.config.batch, len(self.streams)), False)
+            window = min(self.config.window, self.streams.base.shape[1])
+            latest = np.maximum(self.streams.lengths[rows] - window, 0)
+            starts = (self._rng.random(len(rows)) * (latest + 1)).astype(np.int64)
+            loss = self._loss(torch.as_tensor(rows), torch.as_tensor(starts), window)
             self._optimiser.zero_grad()
             loss.backward()  # type: ignore[no-untyped-call]
             torch.nn.utils.clip_grad_norm_(self._parameters.values(), 1.0)
             self._optimiser.step()
             self._schedule.step()
 
-    def _loss(self, rows: torch.Tensor) -> torch.Tensor:
+    def _loss(self, rows: torch.Tensor, starts: torch.Tensor, window: int) -> torch.Tensor:
+        """The objective over stretches of ``window`` steps that begin at ``starts`` of episodes ``rows``."""
         import torch
 
+        ahead = receptive_field() - 1
+        times = starts[:, None] + torch.arange(-ahead, window)
+        # Before an episode the network takes its past to have been equal to the first step.
+        seen = self._inputs[rows[:, None], times.clamp(min=0)]
+        at = (rows[:, None], times[:, ahead:])
         bound = self.config.bound
-        correction = tcn(self._parameters, self._inputs[rows])
-        commands = self._commands[rows] + bound * torch.tanh(correction / bound)
-        q = _servo(commands, self._start[rows], self._share[rows])
-        mask = self._mask[rows]
-        points, targets = self._kinematics(q), self._targets[rows]
+        correction = tcn(self._parameters, seen)[:, ahead:]
+        commands = self._commands[at] + bound * torch.tanh(correction / bound)
+        q = _servo(commands, self._before[rows, starts], self._share[rows])
+        mask, points, targets = self._mask[at], self._kinematics(q), self._targets[at]
         landmark = 1e3 * _masked(_length(points - targets).mean(-1), mask)
-        joint = 1e3 * _masked((q - self._reference[rows]).abs().mean(-1), mask)
-        third = torch.diff(points, n=3, dim=1)
-        jitter = 1e3 * _masked(_length(third).mean(-1), mask[:, 3:])
+        joint = 1e3 * _masked((q - self._reference[at]).abs().mean(-1), mask)
+        jitter = 1e3 * _masked(_length(torch.diff(points, n=3, dim=1)).mean(-1), mask[:, 3:])
         return landmark + JOINT_WEIGHT * joint + self.config.jitter_weight * jitter
 
 
