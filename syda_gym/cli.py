@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from syda_gym import cli_live
+from syda_gym import cli_benchmark, cli_live
 from syda_gym.errors import SydaError
 
 if TYPE_CHECKING:
@@ -178,6 +178,10 @@ def reproduce_paper(
 
 app.command()(cli_live.teleop)
 app.command()(cli_live.record)
+app.command()(cli_benchmark.benchmark)
+app.command()(cli_benchmark.compare)
+app.command()(cli_benchmark.suggest)
+app.command("export-episodes")(cli_benchmark.export_episodes)
 
 motions_app = typer.Typer(help="Look at recordings, check paired data sets, convert them.", no_args_is_help=True)
 app.add_typer(motions_app, name="motions")

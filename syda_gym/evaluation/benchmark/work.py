@@ -17,7 +17,7 @@ from syda_gym.errors import AgentError, MappingError
 from syda_gym.evaluation.benchmark.cells import Cell
 from syda_gym.evaluation.benchmark.config import split_method
 from syda_gym.evaluation.chains import Links, action_groups
-from syda_gym.evaluation.episodes import FIGURES, figures_of, latency, make_env, play_all
+from syda_gym.evaluation.episodes import FIGURES, Recording, figures_of, latency, make_env, play_all
 from syda_gym.motions.clip import Motions, PairedMotions
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ COLUMNS = (
 )  # fmt: skip
 """Columns of the results, one row an episode (or a mapped clip); ``landmarks`` holds each landmark's error [m]."""
 
+_SHOWN_HZ = 15.0  # of the frames kept for the playback
 _KEPT_LINKS = 4  # sets of fitted links that a worker remembers
 
 
@@ -59,14 +60,16 @@ class Worker:
 
         Returns:
             ``rows``: dictionaries with the keys of ``COLUMNS``, numbers that are not finite as ``None``;
-            ``timing``: seconds of fits and episodes, and the latency of one frame.
+            ``timing``: seconds of fits and episodes, and the latency of one frame; ``shown``: the first episode's
+            frames for the report's playback.
         """
         start = time.perf_counter()
-        rows, timing = self._efficiency(cell) if cell.kind == "efficiency" else self._episodes(cell)
+        shown: list[dict[str, Any]] = []
+        rows, timing = self._efficiency(cell) if cell.kind == "efficiency" else self._episodes(cell, shown)
         timing["seconds"] = time.perf_counter() - start
-        return {"cell": cell.to_dict(), "rows": rows, "timing": timing}
+        return {"cell": cell.to_dict(), "rows": rows, "timing": timing, "shown": shown}
 
-    def _episodes(self, cell: Cell) -> tuple[list[dict[str, Any]], dict[str, float]]:
+    def _episodes(self, cell: Cell, shown: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], dict[str, float]]:
         settings = json.loads(cell.settings)
         links = self._links_of(cell.method, cell.seed, settings)
         pair = self._motions.pair(cell.route[0], cell.route[-1])
@@ -78,7 +81,7 @@ class Worker:
             fitted = time.perf_counter()
             timing["fit"] += fitted - start
             if isinstance(mapping.target, Robot):
-                rows += self._play(cell, settings, mapping, fold, group, timing)
+                rows += self._play(cell, settings, mapping, fold, group, timing, shown)
             else:
                 rows += _map(cell, mapping, pair.only_actions(group), fold)
             timing["play"] += time.perf_counter() - fitted
@@ -92,6 +95,7 @@ class Worker:
         fold: int,
         group: Sequence[str],
         timing: dict[str, float],
+        shown: list[dict[str, Any]],
     ) -> list[dict[str, Any]]:
         from syda_gym.simulation.capsules import CapsuleModel
 
@@ -111,6 +115,8 @@ class Worker:
             for recording in play_all(env, agent, cell.seed):
                 figures = figures_of(recording, env.robot, mapping, capsules).to_dict()
                 rows.append(_row(cell, fold, figures))
+                if not shown:
+                    shown.append(_shown(recording, mapping, figures["bound"]))
             if fold == 0:
                 observation, _ = env.reset(seed=cell.seed)
                 agent.reset(1, cell.seed)
@@ -230,6 +236,23 @@ def _map(cell: Cell, mapping: Mapping, test: PairedMotions, fold: int) -> list[d
         }
         rows.append(_row(cell, fold, figures))
     return rows
+
+
+def _shown(recording: Recording, mapping: Mapping, bound: float) -> dict[str, Any]:
+    """A recording small enough to be stored: frames of every body at 15 Hz, rounded to a tenth of a millimetre."""
+    stride = max(1, round(recording.fps / _SHOWN_HZ))
+    frames = [recording.operator[::stride]]
+    for link in list(getattr(mapping, "links", (mapping,)))[:-1]:
+        frames.append(link(frames[-1]))
+    frames.append(recording.q[::stride])
+    return {
+        "motion": recording.motion,
+        "fps": recording.fps / stride,
+        "frames": [np.round(part, 4).tolist() for part in frames],
+        "reference": np.round(recording.reference[::stride], 4).tolist(),
+        "error": np.round(recording.landmark_error.mean(axis=1)[::stride], 4).tolist(),
+        "bound": round(bound, 4) if math.isfinite(bound) else None,
+    }
 
 
 def _row(cell: Cell, fold: int, figures: dict[str, Any]) -> dict[str, Any]:
