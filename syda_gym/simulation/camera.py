@@ -168,6 +168,12 @@ class Camera:
             if self._bullet.isConnected(client):
                 self._bullet.disconnect(client)
 
+    def __enter__(self) -> Camera:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def __del__(self) -> None:
         if getattr(self, "_clients", None):
             self.close()
