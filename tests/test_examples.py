@@ -20,6 +20,8 @@ RUNS: dict[str, tuple[list[str], str]] = {
     "choose_a_route.py": ([], "record next"),
     "train_a_residual.py": (["6144"], "residual on unseen actions"),
     "sb3_from_scratch.py": (["1024"], "after 1024 steps"),
+    "live_udp.py": (["4"], "median latency"),
+    "new_robot.py": ([], "record next"),
 }
 # Needs an environment of its own (RLlib pins another Gymnasium); it is parsed here and was run there.
 APART = {"rllib_from_scratch.py"}
