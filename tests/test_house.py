@@ -34,13 +34,11 @@ class TestModule:
         text = path.read_text()
         assert not text.strip() or ast.get_docstring(ast.parse(text)), "a module starts with its purpose"
 
-    def test_its_public_names_are_what_it_exports(self, path: Path) -> None:
+    def test_says_what_it_offers(self, path: Path) -> None:
+        # Public names beside ``__all__`` are shared within a room; what other rooms and users take is listed.
         tree = ast.parse(path.read_text())
-        exported = exports(tree)
-        defined = {n.name for n in tree.body if isinstance(n, ast.ClassDef | ast.FunctionDef) and n.name[0] != "_"}
-        if defined:
-            assert exported is not None, "a module with public names has __all__"
-            assert defined <= set(exported), f"public but not in __all__: {sorted(defined - set(exported))}"
+        public = {n.name for n in tree.body if isinstance(n, ast.ClassDef | ast.FunctionDef) and n.name[0] != "_"}
+        assert not public or exports(tree), "a module with public names has __all__"
 
     def test_loads_nothing_that_can_run_code(self, path: Path) -> None:
         text = path.read_text()
