@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from syda_gym import cli_benchmark, cli_live
+from syda_gym import cli_agents, cli_benchmark, cli_live
 from syda_gym.errors import SydaError
 
 if TYPE_CHECKING:
@@ -176,6 +176,10 @@ def reproduce_paper(
     console(stderr=True).print(f"tables, plots and study.json are in {out}", markup=False)
 
 
+app.command()(cli_agents.train)
+app.command()(cli_agents.evaluate)
+app.command()(cli_agents.play)
+app.command()(cli_agents.export)
 app.command()(cli_live.teleop)
 app.command()(cli_live.record)
 app.command()(cli_benchmark.benchmark)

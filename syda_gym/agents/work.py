@@ -1,0 +1,333 @@
+"""Work: what the commands ``train``, ``evaluate``, ``play`` and ``export`` call, one function each."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from syda_gym.agents.agent import Agent, BaseAlone
+from syda_gym.agents.bundle import load_agent, read_card, save_agent
+from syda_gym.agents.classical import RIVALS, make_rival
+from syda_gym.agents.config import ResidualConfig
+from syda_gym.agents.figures import Figures
+from syda_gym.agents.interface import Interface
+from syda_gym.agents.predictor_training import PredictorConfig, train_predictor
+from syda_gym.agents.recording import Ground
+from syda_gym.agents.rollout import EpisodeResult, evaluate, mean_of
+from syda_gym.agents.streams import score_streams
+from syda_gym.agents.training import train_residual
+from syda_gym.agents.tuning import Tuned, tune
+from syda_gym.embodiments.catalog import resolve
+from syda_gym.envs.options import TeleopOptions
+from syda_gym.envs.teleop import SydaTeleopEnv
+from syda_gym.errors import AgentError, nearest_name
+from syda_gym.files import asset
+
+__all__ = [
+    "TrainingReport",
+    "compare_agents",
+    "export_bundle",
+    "film",
+    "find_agent",
+    "shipped_agents",
+    "train_agent",
+    "tune_rivals",
+]
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingReport:
+    """What ``train_agent`` made.
+
+    Attributes:
+        agent: the trained stack.
+        bundle: where it was stored.
+        history: steps or round, figures of the agent, figures of what it stands on.
+        best: index into ``history``.
+    """
+
+    agent: Agent
+    bundle: Path
+    history: tuple[tuple[int, Figures, Figures], ...]
+    best: int
+
+
+def train_agent(
+    options: TeleopOptions | Mapping[str, Any],
+    out: str | os.PathLike[str],
+    *,
+    config: ResidualConfig | PredictorConfig | None = None,
+    base: str | os.PathLike[str] = "base",
+    seed: int = 0,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> TrainingReport:
+    """Trains a residual policy or a predictor and stores it as ``out/agent``.
+
+    Args:
+        options: of the environment; disturbances included.
+        out: folder of bundle, checkpoints and logs.
+        config: a ``ResidualConfig`` trains a residual policy by reinforcement learning, a ``PredictorConfig`` a
+            predictor by regression.
+        base: what it stands on: a rival's name, or the path of a bundle. A residual configuration that names a rival of
+            its own comes first where this is ``base``.
+        seed: of everything.
+        resume: go on from the checkpoint in ``out`` (residual policies).
+        progress: called with the share that is done.
+
+    Raises:
+        SydaError: bad options, nothing to resume, a bundle that does not fit.
+    """
+    ground = Ground(options)
+    settings = config or ResidualConfig()
+    folder = Path(out)
+    if isinstance(settings, PredictorConfig):
+        report = _predict(ground, settings, find_agent(base, ground.interface), seed, folder, progress)
+    else:
+        below = None if os.fspath(base) == "base" else find_agent(base, ground.interface)
+        trained = train_residual(
+            ground, settings, seed=seed, folder=folder, resume=resume, progress=progress, base=below
+        )
+        history = tuple((leg.steps, leg.policy, leg.base) for leg in trained.history)
+        report = TrainingReport(trained.agent, folder / "agent.json", history, trained.best)
+    save_agent(
+        report.agent,
+        folder / "agent",
+        mapping=_mapping_card(ground),
+        training={"seed": seed, "config": _plain(settings), "options": _described(ground.options)},
+        figures={
+            "validation": report.history[report.best][1].as_dict(),
+            "base": report.history[report.best][2].as_dict(),
+        },
+    )
+    return report
+
+
+def tune_rivals(
+    options: TeleopOptions | Mapping[str, Any],
+    names: Sequence[str],
+    *,
+    episodes: int = 32,
+    budget: int = 24,
+    seed: int = 0,
+) -> dict[str, Tuned]:
+    """Tunes rivals on an environment's motions by the objective ``J``, in the servo model.
+
+    Args:
+        options: of the environment; keep test motions out of it.
+        names: of ``RIVALS``.
+        episodes: how many are recorded, spread over the clips.
+        budget: settings to try per rival.
+        seed: of disturbances and search.
+    """
+    ground = Ground(options)
+    count = min(episodes, ground.clips)
+    clips = np.linspace(0, ground.clips - 1, count).round().astype(int).tolist()
+    streams = ground.record(episodes, clips=clips, seed=seed)
+    return {
+        name: tune(
+            name,
+            ground.interface,
+            lambda agent: score_streams(agent, streams, ground.rates),
+            budget=budget,
+            seed=seed,
+        )
+        for name in names
+    }
+
+
+def find_agent(name: str | os.PathLike[str], where: Any) -> Agent:
+    """An agent by name or path.
+
+    Args:
+        name: of a rival, of a shipped bundle, or the path of a bundle.
+        where: environment or interface that it shall act in.
+
+    Raises:
+        AgentError: no such agent; the message lists what there is.
+    """
+    interface = where if isinstance(where, Interface) else Interface.of(where)
+    text = os.fspath(name)
+    if text == "base":
+        return BaseAlone(interface)
+    if text in RIVALS:
+        return make_rival(text, interface)
+    if text in shipped_agents():
+        return load_agent(asset("agents", text), interface)
+    if Path(text).with_suffix(".json").is_file() or Path(text).suffix in (".json", ".safetensors"):
+        return load_agent(text, interface)
+    known = (*RIVALS, *shipped_agents())
+    raise AgentError(f"no agent {text!r}: neither a bundle's path nor a name; {nearest_name(text, known)}")
+
+
+def shipped_agents() -> tuple[str, ...]:
+    """Names of the bundles that come with the package."""
+    return tuple(sorted(path.stem for path in asset("agents").glob("*.json")))
+
+
+def compare_agents(
+    options: TeleopOptions | Mapping[str, Any],
+    agents: Sequence[str | os.PathLike[str]],
+    *,
+    clips: Sequence[int | str] | None = None,
+    draws: int = 1,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> dict[str, list[EpisodeResult]]:
+    """Plays agents, by name or path, on the same episodes; ``base`` is always among them.
+
+    Args:
+        options: of the environment.
+        agents: see ``find_agent``.
+        clips: which to play; all by default.
+        draws: episodes per clip.
+        seed: of disturbances.
+        progress: called with the share that is done.
+    """
+    given = options if isinstance(options, TeleopOptions) else TeleopOptions(**options)
+    env = SydaTeleopEnv(options=given)
+    interface = Interface.of(env)
+    env.close()
+    names = list(dict.fromkeys(["base", *(os.fspath(agent) for agent in agents)]))
+    return evaluate(
+        given,
+        {name: find_agent(name, interface) for name in names},
+        clips=clips,
+        draws=draws,
+        seed=seed,
+        progress=progress,
+    )
+
+
+def film(
+    options: TeleopOptions | Mapping[str, Any],
+    agent: str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    *,
+    clip: int | str = 0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Figures:
+    """Plays one episode and writes it as a video: operator, robot, and the reference as a ghost.
+
+    Args:
+        options: of the environment.
+        agent: see ``find_agent``.
+        path: of the ``.mp4``.
+        clip: index or name.
+        seed: of disturbances.
+        progress: called with the share that is done.
+
+    Returns:
+        Figures of the episode.
+    """
+    from syda_gym.simulation.camera import Camera
+    from syda_gym.simulation.video import write_video
+
+    given = options if isinstance(options, TeleopOptions) else TeleopOptions(**options)
+    env = SydaTeleopEnv(options=TeleopOptions.of(given, {"action_mode": "position"}))
+    acting = find_agent(agent, env)
+    operator = env.layout["operator"]
+    try:
+        observation, _ = env.reset(seed=seed, options={"motion": clip})
+        acting.reset(1, seed)
+        rows: list[tuple[Any, ...]] = []
+        done = False
+        while not done:
+            seen = np.asarray(observation[operator], dtype=np.float64)
+            action = env.action_from_command(acting.act(observation[None])[0])
+            observation, _, terminated, truncated, info = env.step(np.asarray(action, dtype=np.float32))
+            rows.append((info["q"], info["reference"], info["contacts"], seen))
+            done = terminated or truncated
+    finally:
+        env.close()
+    q, reference, contacts, frames = (np.array(column) for column in zip(*rows, strict=True))
+    with Camera(env.robot, resolve(given.operator)) as camera:
+
+        def pictures() -> Any:
+            for index in range(len(q)):
+                if progress is not None:
+                    progress((index + 1) / len(q))
+                yield camera.picture(q[index], reference=reference[index], operator=frames[index])
+
+        write_video(path, pictures(), fps=env.control_hz)
+    from syda_gym.agents.figures import episode_figures
+
+    return episode_figures(env.robot, q, reference, contacts)
+
+
+def export_bundle(bundle: str | os.PathLike[str], path: str | os.PathLike[str]) -> float:
+    """Writes a bundle, or a shipped agent, as an ONNX graph and compares the two on random observations.
+
+    Args:
+        bundle: path of the bundle, or name of a shipped one.
+        path: of the ``.onnx`` file.
+
+    Returns:
+        Largest difference of commands [rad].
+
+    Raises:
+        MissingExtraError: onnx or onnxruntime is not installed.
+        AgentError: the stack holds an agent without a graph, or the graph differs by more than a milliradian.
+    """
+    from syda_gym.agents.export import OnnxRunner, export_onnx, parity
+    from syda_gym.agents.runner import stored_interface
+
+    source = asset("agents", os.fspath(bundle)) if os.fspath(bundle) in shipped_agents() else Path(bundle)
+    interface = stored_interface(read_card(source))
+    agent = load_agent(source, interface)
+    export_onnx(agent, path)
+    difference = parity(agent, OnnxRunner(path), _plausible(interface))
+    if not difference < 1e-3:
+        Path(path).unlink(missing_ok=True)
+        raise AgentError(f"the graph differs from the agent by {difference:.2g} rad; this is a defect, report it")
+    return difference
+
+
+def mean_table(results: Mapping[str, Sequence[EpisodeResult]]) -> dict[str, Figures]:
+    """Mean figures of every agent."""
+    return {name: mean_of(found) for name, found in results.items()}
+
+
+def _predict(
+    ground: Ground, config: PredictorConfig, base: Agent, seed: int, folder: Path, progress: Progress | None
+) -> TrainingReport:
+    train, validation = ground.record(256, seed=2 * seed), ground.record(48, seed=2 * seed + 1)
+    trained = train_predictor(base, train, validation, ground.rates, config, seed=seed, progress=progress)
+    below = score_streams(base, validation, ground.rates)
+    history = tuple((index, figures, below) for index, figures in enumerate(trained.history))
+    return TrainingReport(trained.agent, folder / "agent.json", history, trained.best)
+
+
+def _plausible(interface: Interface, steps: int = 50) -> Any:
+    """Observations along a random smooth motion, ``(T, 2, size)``."""
+    rng = np.random.default_rng(0)
+    robot = interface.robot
+    observations = np.zeros((steps, 2, interface.size))
+    walk = np.cumsum(rng.normal(0.0, 0.02, (steps, 2, interface.n)), axis=0)
+    q = np.stack([robot.clamp(robot.rest + step) for step in walk])
+    observations[..., interface.layout["q"]] = q
+    observations[..., interface.layout["base_error"]] = rng.normal(0.0, 0.03, q.shape)
+    observations[..., interface.layout["packet_age"]] = rng.integers(0, 4, (steps, 2, 1)) * interface.dt
+    return observations
+
+
+def _mapping_card(ground: Ground) -> dict[str, Any]:
+    bodies = ground.repertoire.routes[0].bodies
+    card = ground.repertoire.pilot.mapping(bodies).card
+    return {"route": list(bodies), "method": card.method, "preset": card.preset}
+
+
+def _plain(config: ResidualConfig | PredictorConfig) -> dict[str, Any]:
+    return config.as_dict() if isinstance(config, ResidualConfig) else dict(vars(config))
+
+
+def _described(options: TeleopOptions) -> dict[str, str]:
+    return {name: str(value) for name, value in vars(options).items() if value is not None}
