@@ -11,10 +11,11 @@ from syda_gym.teleoperation.calibration import Calibration, Calibrator
 from syda_gym.teleoperation.confidence import ConfidencePolicy
 from syda_gym.teleoperation.filters import OneEuroFilter
 from syda_gym.teleoperation.guarded import GuardedMapping
+from syda_gym.teleoperation.homing import WayHome
 from syda_gym.teleoperation.limiter import CommandLimiter
 from syda_gym.teleoperation.self_collision import SelfCollision
 from syda_gym.teleoperation.tick import CONTROLS, Decision, LoopSettings, State, Tick
-from syda_gym.teleoperation.watchdog import Ease, Watch, Watchdog
+from syda_gym.teleoperation.watchdog import Watch, Watchdog
 
 __all__ = ["TeleoperationLoop"]
 
@@ -75,7 +76,8 @@ class TeleoperationLoop:
         self._frame_times: tuple[float, float | None] | None = None
         self._trust = 0.0
         self._following_since = 0.0
-        self._ease: Ease | None = None
+        self._home = WayHome(self.robot.rest, self.settings.ease * self._limiter.speed, self._collision)
+        self._held_back = False
         self._ease_asked = False
         self.state = State.CALIBRATING
 
@@ -137,11 +139,11 @@ class TeleoperationLoop:
             self.state = State.CALIBRATING
         elif control == "rest":
             self._ease_asked = True
-            self._begin_ease(now)
+            self._home.begin(self._command, now)
 
     def _enter_pause(self) -> None:
         self.state = State.PAUSED
-        self._ease = None
+        self._home.end()
 
     def _take(self, tick: Tick, reasons: list[str]) -> tuple[float, bool]:
         """Calibrates with the frame or maps it; returns the error bound and whether the target moved."""
@@ -218,24 +220,19 @@ class TeleoperationLoop:
         verdict = self._watchdog.verdict(now)
         if verdict is Watch.FOLLOW and self._trust > 0.0:
             if self.state is not State.FOLLOWING:
-                self.state, self._following_since, self._ease = State.FOLLOWING, now, None
+                self.state, self._following_since = State.FOLLOWING, now
+                self._home.end()
+            self._home.remember(self._command)
             return self._trust * self._soft_start(now)
         if verdict is not Watch.EASE:
             self.state = State.HOLDING
             if verdict is Watch.HOLD:
                 reasons.append("watchdog: no good frame")
             return 0.0
-        if self._ease is None:
-            self._begin_ease(now)
         return self._on_the_way_home(now)
 
-    def _begin_ease(self, now: float) -> None:
-        self._ease = Ease(self._command, self.robot.rest, self.settings.ease * self._limiter.speed, now)
-        self.state = State.EASING
-
     def _on_the_way_home(self, now: float) -> float:
-        assert self._ease is not None  # begun by the caller; for the type checker
-        self._target = self._ease.at(now)
+        self._target = self._home.target(self._command, now, not self._held_back)
         arrived = float(np.max(np.abs(self._command - self.robot.rest))) < _ARRIVED
         self.state = State.RESTING if arrived else State.EASING
         return self.settings.ease
@@ -247,9 +244,11 @@ class TeleoperationLoop:
 
     def _move(self, dt: float, factor: float, reasons: list[str]) -> None:
         wanted = self._limiter.move(self._command, self._target, dt, factor)
+        self._held_back = False
         if self._collision is not None:
             allowed = self._collision.allowed(self._command, wanted)
             if allowed is not wanted:
+                self._held_back = True
                 reasons.append("self-collision: held back")
                 wanted = allowed if self._limiter.allows(allowed) else self._command
         self._command = wanted

@@ -238,3 +238,28 @@ def test_settings_are_checked() -> None:
     with pytest.raises(OptionError, match="did you mean 'silence'"):
         LoopSettings.from_json({"silense": 1.0})
     assert LoopSettings.from_json(LoopSettings(rate=60.0).to_json()) == LoopSettings(rate=60.0)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_it_gets_home_from_wherever_it_was_led(
+    mapping: LimbMapping, adult: HumanSkeleton, pepper: Robot, seed: int
+) -> None:
+    stage = Stage(mapping, cutoff=0.0, soft_start=0.0, calibration=0.0)
+    check = stage.loop._collision
+    assert check is not None
+    rng, barred = np.random.default_rng(seed), False
+    for _ in range(40):
+        mapping.fixed = pepper.clamp(rng.uniform(pepper.lower, pepper.upper))[0]
+        for _ in range(15):
+            stage.feed(adult.standing())
+        barred = not check.free_path(stage.loop.command, pepper.rest)
+        if barred:
+            break
+    assert barred, "from here the straight way home leads through the body"
+    for _ in range(3000):
+        last = stage.feed()
+        if last.state is State.RESTING:
+            break
+    assert last.state is State.RESTING
+    assert not any(check.touches(command) for command in stage.path[::7])
+    stage.check(pepper)
