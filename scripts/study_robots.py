@@ -31,6 +31,8 @@ in every robot listed); upper arm and forearm; T from the adult to the robot and
 of Pepper and NAO is the better stop on the way from the adult, if a lab has the pairs adult-Pepper, adult-NAO,
 Pepper-robot and NAO-robot.
 
+<!-- numbers: this page, written by scripts/study_robots.py -->
+
 | robot | joints | shoulder, elbow, wrist, tip | upper arm, forearm [m] | T from adult | T to adult | best stop |
 |---|---|---|---|---|---|---|
 """

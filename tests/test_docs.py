@@ -193,7 +193,7 @@ def tables() -> list[tuple[Path, str, str]]:
     found = []
     for path in PAGES:
         text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
-        for match in re.finditer(r"((?:^<!--.*-->\n+)?)((?:^\|.*\|[ \t]*\n)+)", text, re.MULTILINE):
+        for match in re.finditer(r"((?:^<!-- numbers:.*-->\n+)?)((?:^\|.*\|[ \t]*\n)+)", text, re.MULTILINE):
             if NUMBER.search(re.sub(r"`[^`]*`", "", match[2])):
                 found.append((path, match[1].strip(), match[2]))
     return found
