@@ -366,11 +366,15 @@ def transferability(
             study = measure_prediction(
                 motions, bodies=bodies or None, folds=folds, max_hops=max_hops, seed=seed, progress=tell
             )
+        tables = [prediction_table(study), *([prediction_table(study, full=True)] if study.full_scores else [])]
         if picture:
             from syda_gym.evaluation.prediction_picture import prediction_png
 
             write_bytes(picture, prediction_png(study))
-        print_json(study.as_dict()) if as_json else print_table(prediction_table(study))
+        if as_json:
+            print_json(study.as_dict())
+        for table in () if as_json else tables:
+            print_table(table)
         return
     names = list(bodies or ("adult", "kid", "pepper", "nao"))
     chosen = [
@@ -380,11 +384,12 @@ def transferability(
     pairs = list(permutations(distinct, 2))
     if len(names) == 1:  # one body: how it leads and follows the others
         pairs = [(a, b) for a, b in pairs if distinct[0] in (a, b)]
-    links = [measure(a, b, definition, seed=seed) for a, b in pairs]  # type: ignore[arg-type]
+    kind: Any = definition  # checked, with the nearest name, where it is used
+    links = [measure(a, b, kind, seed=seed) for a, b in pairs]
     if picture:
         from syda_gym.transferability.pictures import clouds_png
 
-        write_bytes(picture, clouds_png(*pairs[0], definition, seed=seed))  # type: ignore[arg-type]
+        write_bytes(picture, clouds_png(*pairs[0], kind, seed=seed))
     print_json([link.as_dict() for link in links]) if as_json else print_table(links_table(links))
 
 
@@ -398,7 +403,9 @@ def route(
     motions: MotionsOption = "embedded",
     definition: Annotated[str, typer.Option(help="`general` or `paper`.")] = "general",
     max_hops: Annotated[int | None, typer.Option(help="Longest chain.", min=1)] = None,
-    predictor: Annotated[str, typer.Option(help="What decides: `T`, `C`, `L`, `coverage`, `hops`, ...")] = "T",
+    predictor: Annotated[
+        str, typer.Option(help="What decides: `T`, `C`, `L`, `coverage`, `hops`, or `measured`.")
+    ] = "T",
     count: Annotated[int, typer.Option(help="How many routes to list.", min=1)] = 5,
     noise: Annotated[bool, typer.Option("--noise", help="Take alpha from the noise of the recordings.")] = False,
     suggest: Annotated[bool, typer.Option("--suggest", help="Also say which pair to record next.")] = False,
@@ -410,25 +417,34 @@ def route(
     from syda_gym.files import write_bytes
     from syda_gym.transferability import routing, suggestion
 
+    kind: Any = definition  # checked, with the nearest name, where it is used
     fitted, bodies = _fitted_pairs(pairs, motions)
     options: dict[str, Any] = {"max_hops": max_hops, "predictor": predictor}
+    if predictor == "measured":
+        from syda_gym.evaluation.prediction import measure_bodies
+
+        named = [(getattr(a, "name", a), getattr(b, "name", b)) for a, b in fitted]
+        with stages({"fit": "Fitting pairs to measure bodies"}) as tell:
+            options["predictor"] = measure_bodies(motions, named, progress=tell)
     if noise:
         from syda_gym.evaluation.prediction import motion_noise
         from syda_gym.motions.loading import load_motions
         from syda_gym.transferability.noise import alpha_from_noise
 
         options["alpha"] = alpha_from_noise(motion_noise(load_motions(motions)))
-    best = routing.best_route(source, target, fitted, definition, **options)  # type: ignore[arg-type]
-    ranked = routing.ranked_routes(source, target, fitted, definition, count=count, **options)  # type: ignore[arg-type]
+    best = routing.best_route(source, target, fitted, kind, **options)
+    ranked = routing.ranked_routes(source, target, fitted, kind, count=count, **options)
     routes = [best, *(other for other in ranked if other.bodies != best.bodies)][:count]
     further, spanning = None, None
     if suggest:
-        further = suggestion.suggest(bodies, fitted, definition, **options)[:count]  # type: ignore[arg-type]
-        spanning = suggestion.spanning_pairs(bodies, (), definition, predictor=predictor, alpha=options.get("alpha"))  # type: ignore[arg-type]
+        further = suggestion.suggest(bodies, fitted, kind, **options)[:count]
+        spanning = suggestion.spanning_pairs(
+            bodies, (), kind, predictor=options["predictor"], alpha=options.get("alpha")
+        )
     if picture:
         from syda_gym.transferability.pictures import graph_png
 
-        graph = routing.BodyGraph((), fitted, definition, predictor=predictor, alpha=options.get("alpha"))  # type: ignore[arg-type]
+        graph = routing.BodyGraph((), fitted, kind, predictor=options["predictor"], alpha=options.get("alpha"))
         write_bytes(picture, graph_png(graph, best))
     if as_json:
         print_json({

@@ -22,11 +22,11 @@ from syda_gym.mappings.fitting import fit_many
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
-from syda_gym.transferability.measured import measured_bodies
+from syda_gym.transferability.measured import MeasuredBodies, measured_bodies
 from syda_gym.transferability.metric import Transferability, transferability
 from syda_gym.transferability.noise import alpha_from_noise, high_frequency_noise
 
-__all__ = ["PredictionStudy", "RouteResult", "motion_noise", "validate"]
+__all__ = ["PredictionStudy", "RouteResult", "measure_bodies", "motion_noise", "validate"]
 
 Progress = Callable[[str, float], None]
 Names = tuple[str, ...]
@@ -73,6 +73,8 @@ class PredictionStudy:
         links: ordered pair to its transferability, general definition.
         routes: every chain with its error and predictors.
         scores: every predictor with its rank correlations, best first.
+        full_scores: the same over routes on which every body has both arms; a lost arm is easy to foresee and lifts
+            every predictor that counts it. Empty if everybody has both.
     """
 
     motions: str
@@ -85,6 +87,7 @@ class PredictionStudy:
     links: dict[tuple[str, str], Transferability]
     routes: tuple[RouteResult, ...]
     scores: tuple[PredictorScore, ...]
+    full_scores: tuple[PredictorScore, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Everything, JSON-able."""
@@ -97,6 +100,7 @@ class PredictionStudy:
             "seed": self.seed,
             "noise": self.noise,
             "scores": [score.as_dict() for score in self.scores],
+            "full_scores": [score.as_dict() for score in self.full_scores],
             "routes": [
                 {"bodies": list(r.bodies), "error": r.error, "metres": r.metres, "predicted": r.predicted}
                 for r in self.routes
@@ -150,9 +154,11 @@ def validate(
     noise = motion_noise(full, names)
     links = _links(table.bodies, samples, seed)
     groups = np.array_split(np.random.default_rng(seed).permutation(table.distinct), folds)
-    fits = _fit_all(table, groups, method, preset, seed, max(1, round(_LAG_SECONDS * fps)), progress)
+    fits = _fit_all(table, groups, method, preset, seed, _fit_options(preset, fps), progress)
     training, errors = _errors(table, groups, fits, max_hops, progress)
     routes = _results(table.bodies, links, alpha_from_noise(noise), training, errors)
+    complete = [route for route in routes if all(len(table.bodies[name].sides) == 2 for name in route.bodies)]
+    partial = 0 < len(complete) < len(routes)
     return PredictionStudy(
         motions=full.name,
         synthetic=full.synthetic,
@@ -164,7 +170,49 @@ def validate(
         links=links["general"],
         routes=routes,
         scores=score_predictors(routes, seed=seed, resamples=resamples),
+        full_scores=score_predictors(complete, seed=seed, resamples=resamples) if partial else (),
     )
+
+
+def measure_bodies(
+    motions: str | Motions,
+    pairs: Sequence[tuple[str, str]] | None = None,
+    *,
+    method: str = "syda",
+    preset: str | None = None,
+    fps: float = 5.0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> MeasuredBodies:
+    """Fits pairs and turns their training errors into a predictor for routing.
+
+    Args:
+        motions: recordings.
+        pairs: which to fit; all that were recorded together by default.
+        method: how pairs are fitted.
+        preset: of the method.
+        fps: frames per second that are kept.
+        seed: of the fits.
+        progress: told the stage (``fit``) and its finished fraction.
+
+    Returns:
+        Pass it as ``predictor`` to ``best_route``, or ask its ``error(route)``.
+    """
+    recorded = load_motions(load_motions(motions), fps=fps)
+    chosen = list(pairs or recorded.pairs)
+    errors: dict[tuple[str, str], float] = {}
+    for done, (a, b) in enumerate(chosen):
+        if recorded.bodies[a].kind > recorded.bodies[b].kind:
+            a, b = b, a  # human to robot is the fitted direction
+        pair = recorded.pair(a, b)
+        (model,) = fit_many([pair], method, preset, [seed], **_fit_options(preset, fps))
+        rows = np.arange(len(pair))[:: max(1, len(pair) // _MOST_TRAINING_FRAMES)]
+        for link, given, wanted in ((model, pair.source, pair.target), (model.inverse(), pair.target, pair.source)):
+            gap = _gap(link.source, link.target, link(given[rows]), wanted[rows])
+            errors[link.source.name, link.target.name] = gap / link.target.reach
+        if progress:
+            progress("fit", (done + 1) / len(chosen))
+    return measured_bodies(errors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,14 +281,13 @@ def _fit_all(
     method: str,
     preset: str | None,
     seed: int,
-    lag: int,
+    options: dict[str, Any],
     progress: Progress | None,
 ) -> list[dict[tuple[str, str], Mapping]]:
     """Mappings of every ordered pair, per fold."""
     order = sorted(table.bodies, key=lambda name: table.bodies[name].kind)  # human to robot is the fitted direction
     pairs = [(a, b) for i, a in enumerate(order) for b in order[i + 1 :]]
     fits: list[dict[tuple[str, str], Mapping]] = [{} for _ in groups]
-    options: dict[str, Any] = {"lag": lag, "confidence": False} if preset != "paper" else {}
     for done, (a, b) in enumerate(pairs):
         pair = table.motions.pair(a, b)
         models = fit_many(
@@ -291,10 +338,19 @@ def _step(fold: dict[tuple[str, str], Mapping], arrived: dict[Names, FloatArray]
 
 def _error(table: _Frames, route: Names, mapped: FloatArray, rows: NDArray[np.intp]) -> float:
     """Mean distance of elbows and wrists [m] on the arms that both ends have."""
-    body, source = table.bodies[route[-1]], table.bodies[route[0]]
-    arms = [i for i, side in enumerate(body.sides) if side in source.sides] or list(range(len(body.sides)))
-    gap = body.arm_points(mapped)[:, arms, 1:] - body.arm_points(table.frames[route[-1]][rows])[:, arms, 1:]
+    wanted = table.frames[route[-1]][rows]
+    return _gap(table.bodies[route[0]], table.bodies[route[-1]], mapped, wanted)
+
+
+def _gap(source: Embodiment, target: Embodiment, mapped: FloatArray, wanted: FloatArray) -> float:
+    arms = [i for i, side in enumerate(target.sides) if side in source.sides] or list(range(len(target.sides)))
+    gap = target.arm_points(mapped)[:, arms, 1:] - target.arm_points(wanted)[:, arms, 1:]
     return float(np.linalg.norm(gap, axis=-1).mean())
+
+
+def _fit_options(preset: str | None, fps: float) -> dict[str, Any]:
+    """No error bound, and a lag of the same time at any frame rate."""
+    return {} if preset == "paper" else {"lag": max(1, round(_LAG_SECONDS * fps)), "confidence": False}
 
 
 def _results(

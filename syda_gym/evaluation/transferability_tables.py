@@ -72,8 +72,13 @@ def suggestions_table(suggestions: Sequence[Suggestion], spanning: SpanningPairs
     return Table("What to record next", columns, rows, note)
 
 
-def prediction_table(study: PredictionStudy) -> Table:
-    """Rank correlations of every predictor with the held-out error of routes."""
+def prediction_table(study: PredictionStudy, full: bool = False) -> Table:
+    """Rank correlations of every predictor with the held-out error of routes.
+
+    Args:
+        study: from ``validate``.
+        full: over routes on which every body has both arms.
+    """
     columns = [
         Column("predictor"),
         Column("all routes", digits=2, tip="Spearman with minus the error over arm length"),
@@ -82,10 +87,12 @@ def prediction_table(study: PredictionStudy) -> Table:
         Column("choice of route", digits=2, tip="mean Spearman over routes between the same ends"),
         Column("regret", "%", digits=0, scale=100.0, tip="excess error of the chain it prefers over the best chain"),
     ]
-    rows: list[list[Cell]] = [[s.name, s.all, s.metres, s.pairs, s.choice, s.regret] for s in study.scores]
+    scores = study.full_scores if full else study.scores
+    rows: list[list[Cell]] = [[s.name, s.all, s.metres, s.pairs, s.choice, s.regret] for s in scores]
     kind = "synthetic" if study.synthetic else "recorded"
     note = (
-        f"{len(study.routes)} routes among {len(study.bodies)} bodies ({', '.join(study.bodies)}), {kind} motions, "
+        f"{scores[0].all.count} routes among {len(study.bodies)} bodies ({', '.join(study.bodies)}), {kind} motions, "
         f"{study.folds} groups of actions held out in turn. 95 % bootstrap intervals over pairs of ends."
     )
-    return Table("Does it predict? Spearman with the held-out error, 1 is perfect", columns, rows, note)
+    which = ", routes of two-armed bodies alone" if full else ""
+    return Table(f"Does it predict? Spearman with the held-out error, 1 is perfect{which}", columns, rows, note)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from syda_gym.errors import MotionError, OptionError
-from syda_gym.evaluation.prediction import validate
+from syda_gym.evaluation.prediction import measure_bodies, validate
 from syda_gym.evaluation.prediction_picture import prediction_png
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
@@ -49,6 +49,23 @@ def test_one_armed_bodies_are_scored_on_the_arm_that_all_share(few: Motions) -> 
     study = validate(few, bodies=("adult", "kid", "left_only"), folds=2, max_hops=1, samples=2**12, resamples=20)
     errors = {route.bodies: route.error for route in study.routes}
     assert errors["left_only", "adult"] < 0.3  # the right arm, which nobody could know, does not count
+
+
+def test_scores_without_the_lost_arm_are_told_apart(few: Motions) -> None:
+    study = validate(
+        few, bodies=("adult", "kid", "tall", "left_only"), folds=2, max_hops=2, samples=2**12, resamples=20
+    )
+    assert study.scores[0].all.count == 12 + 24
+    assert study.full_scores[0].all.count == 6 + 6
+    assert {score.name for score in study.full_scores} == {score.name for score in study.scores}
+
+
+def test_measured_bodies_predict_the_pairs_that_they_come_from(few: Motions) -> None:
+    pairs = [("adult", "kid"), ("kid", "tall"), ("adult", "tall")]
+    bodies = measure_bodies(few, pairs)
+    assert set(bodies.leading) == {"adult", "kid", "tall"}
+    assert 0.02 < bodies.error(("adult", "kid")) < 0.3
+    assert bodies.error(("adult", "tall", "kid")) > bodies.error(("adult", "kid"))
 
 
 def test_bad_options(few: Motions) -> None:
