@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from syda_gym.transferability.routing import Route as Route
     from syda_gym.transferability.routing import best_route as best_route
     from syda_gym.transferability.routing import ranked_routes as ranked_routes
+    from syda_gym.transferability.suggestion import spanning_pairs as spanning_pairs
+    from syda_gym.transferability.suggestion import suggest as suggest
 
 _LAZY = {
     "Transferability": "metric",
@@ -23,9 +25,19 @@ _LAZY = {
     "Route": "routing",
     "best_route": "routing",
     "ranked_routes": "routing",
+    "spanning_pairs": "suggestion",
+    "suggest": "suggestion",
 }
 
-__all__ = ["Route", "Transferability", "best_route", "ranked_routes", "transferability"]
+__all__ = [
+    "Route",
+    "Transferability",
+    "best_route",
+    "ranked_routes",
+    "spanning_pairs",
+    "suggest",
+    "transferability",
+]
 
 
 class _CallableModule(ModuleType):
