@@ -15,7 +15,7 @@ from syda_gym.teleoperation.tick import Decision, State, Tick
 
 __all__ = ["run"]
 
-_HOMEWARD = 20.0  # s; the longest way to rest at the end of a run
+_HOMEWARD = 90.0  # s; the longest way to rest at the end of a run; slow joints and detours take their time
 
 
 def run(
