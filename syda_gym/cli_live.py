@@ -165,6 +165,7 @@ def teleop(
     settings = LoopSettings(
         rate=rate, calibration=calibration, axes=axes, speed=limit, bound_slow=bound_slow, bound_hold=bound_hold
     )
+    _end_gently()
     with _Screen() as screen:
         stats = teleoperate(
             chosen,
@@ -272,6 +273,15 @@ class _Screen:
 
     def __exit__(self, *_: object) -> None:
         self._stack.close()
+
+
+def _end_gently() -> None:
+    """Makes a termination signal end the run as Ctrl-C does, with the robot going to rest."""
+    import signal
+    import threading
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def _console(*, stderr: bool = False) -> Console:

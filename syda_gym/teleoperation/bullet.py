@@ -19,7 +19,7 @@ from syda_gym.errors import OptionError, TeleoperationError
 from syda_gym.simulation.backend import make_world
 from syda_gym.simulation.rates import Rates
 from syda_gym.teleoperation.sinks import Sink
-from syda_gym.teleoperation.tick import Decision
+from syda_gym.teleoperation.tick import Decision, State
 
 __all__ = ["BulletSink"]
 
@@ -110,13 +110,15 @@ class BulletSink(Sink):
         return angles
 
     def send(self, decision: Decision) -> None:
-        """Takes over the command.
+        """Takes over the command; after an emergency stop none until it is released.
 
         Raises:
             TeleoperationError: the simulation or the video has failed.
         """
         if self._failure is not None:
             raise TeleoperationError(f"the simulated robot failed: {self._failure}") from self._failure
+        if decision.state is State.STOPPED:
+            return
         with self._lock:
             self._command = decision.command
 

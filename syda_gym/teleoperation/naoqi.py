@@ -11,7 +11,7 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MissingExtraError, OptionError, TeleoperationError
 from syda_gym.teleoperation.sinks import Sink
-from syda_gym.teleoperation.tick import Decision
+from syda_gym.teleoperation.tick import Decision, State
 
 __all__ = ["NaoqiSink"]
 
@@ -95,13 +95,15 @@ class NaoqiSink(Sink):
         return np.array(self._motion.getAngles(self._names, True), dtype=np.float64)
 
     def send(self, decision: Decision) -> None:
-        """Hands the command to the thread.
+        """Hands the command to the thread; after an emergency stop nothing is sent until it is released.
 
         Raises:
             TeleoperationError: an earlier call failed; the robot is gone or refuses.
         """
         if self._failure is not None:
             raise TeleoperationError(f"the robot at {self.url} does not answer any more: {self._failure}")
+        if decision.state is State.STOPPED:
+            return  # a command, even the last one again, would set the motors going
         with self._condition:
             if self._next is not None:
                 self.overtaken += 1

@@ -89,6 +89,10 @@ def test_commands_reach_the_robot_newest_first(served: tuple[str, ALMotion], pep
         motion.delay = 0.0
         sink.stop()
         assert ("killAll",) in motion.calls
+        count = len(motion.calls)
+        sink.send(Decision(0.0, State.STOPPED, pepper.rest))
+        time.sleep(0.1)
+        assert len(motion.calls) == count, "nothing sets the motors going after an emergency stop"
 
 
 def test_no_robot_and_bad_settings_are_named(pepper: Robot) -> None:

@@ -99,6 +99,10 @@ def test_the_simulated_robot_follows_and_is_filmed(pepper: Robot, tmp_path: Path
             assert time.monotonic() < end
             time.sleep(0.05)
         sink.stop()
+        held = sink.angles()
+        sink.send(Decision(0.0, State.STOPPED, pepper.rest))
+        time.sleep(0.2)
+        assert np.abs(sink.angles() - held).max() < 0.02, "after an emergency stop it stays where it is"
     assert (tmp_path / "film.mp4").stat().st_size > 1000
     with pytest.raises(TeleoperationError, match="not open"):
         sink.angles()
