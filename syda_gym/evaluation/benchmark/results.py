@@ -75,8 +75,7 @@ class Results:
         Args:
             name: of the column.
             over: ``"episodes"`` for the bootstrap stratified by action (the same actions, recorded again),
-            ``"actions"``
-                for one over whole actions (what other actions would give; wider).
+                ``"actions"`` for one over whole actions (what other actions would give; wider).
             **options: of the bootstrap.
         """
         bootstrap: Callable[..., Estimate] = estimate if over == "episodes" else clustered_estimate
