@@ -125,16 +125,26 @@ class Fleet:
         """Base commands of the next step, ``(B, n)`` [rad]."""
         return self._base
 
-    def reset(self, which: Sequence[int], rngs: Sequence[Generator], wishes: Sequence[EpisodeWish]) -> None:
+    def reset(
+        self,
+        which: Sequence[int],
+        rngs: Sequence[Generator],
+        wishes: Sequence[EpisodeWish],
+        *,
+        handed_out: bool = True,
+    ) -> None:
         """Begins new episodes.
 
         Args:
             which: indices of the robots ``(k,)``.
             rngs: random numbers of each of them.
             wishes: what is asked of each of them.
+            handed_out: whether a caller may hold arrays of the present state, which then must not change.
         """
-        rows = np.asarray(which, dtype=np.intp)
-        self._let_go()
+        index_rows = np.asarray(which, dtype=np.intp)
+        rows: Any = slice(None) if len(which) == self.count else index_rows
+        if handed_out:
+            self._let_go()
         for index, rng, wish in zip(which, rngs, wishes, strict=True):
             clip, frame, route = self._draw(rng, wish)
             self.clip[index], self._k[index], self.route[index] = clip, frame, route
@@ -145,7 +155,7 @@ class Fleet:
         self._start[rows] = self._frame[rows] = k = self._k[rows]
         self._length[rows] = self._scripts.lengths[self.clip[rows]]
         base = self._scripts.base(rows, k)[:, : self._n]
-        self.world.reset(rows, base)
+        self.world.reset(index_rows, base)
         self._start_q[rows] = base
         self._base[rows] = self._command[rows] = base
         self._correction[rows] = 0.0
@@ -161,7 +171,7 @@ class Fleet:
         target = self._scripts.target(rows, k)
         error = pose - target
         self._target[rows], self._error[rows] = target, error
-        points = error[:, self._n :].reshape(len(rows), -1, 3)
+        points = error[:, self._n :].reshape(len(which), -1, 3)
         self._distances[rows, : self._points] = np.sqrt(in_order(points * points))
         self._distances[rows, self._points :] = 0.0
 
@@ -380,14 +390,18 @@ class Fleet:
         outside = (wanted < self._safe_lower) | (wanted > self._safe_upper)
         if not outside.any():
             return wanted, np.zeros(self.count, dtype=np.int64)
-        command = self.robot.clamp(wanted)
-        return command, np.add.reduce(np.abs(command - wanted) > 1e-9, axis=1, dtype=np.int64)
+        rows = np.flatnonzero(outside.any(axis=1))
+        command, hits = wanted.copy(), np.zeros(self.count, dtype=np.int64)
+        command[rows] = self.robot.clamp(wanted[rows])
+        hits[rows] = (np.abs(command[rows] - wanted[rows]) > 1e-9).sum(axis=1)
+        return command, hits
 
     def _let_go(self) -> None:
         """Copies what ``info`` may have handed out, before a reset writes into it."""
         for name in _HANDED_OUT:
             setattr(self, name, getattr(self, name).copy())
         self._trail = [array.copy() for array in self._trail]
+        self.world.let_go()
 
     def _remember(self, base: FloatArray) -> None:
         self._past[:, :, 1:] = self._past[:, :, :-1].copy()

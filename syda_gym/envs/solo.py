@@ -48,7 +48,7 @@ class Solo(Fleet):
 
     def begin(self, rng: np.random.Generator, wish: Any) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begins an episode; returns observation and info."""
-        self.reset([0], [rng], [wish])
+        self.reset([0], [rng], [wish], handed_out=False)
         observation = self.observe()[0]
         self._read()
         return observation, self._first_info()
@@ -210,7 +210,7 @@ class Solo(Fleet):
             elif isinstance(value, dict):
                 result[key] = {name: column.item(0) for name, column in value.items()}
             else:
-                result[key] = value.item(0) if value.ndim == 1 else value[0]
+                result[key] = value.item(0) if value.ndim == 1 else value[0].copy()
         return result
 
     def _end(self, terminated: bool) -> bool:

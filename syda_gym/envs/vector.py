@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.envs.face import Face
-from syda_gym.envs.fleet import Fleet
+from syda_gym.envs.fleet import EpisodeWish, Fleet
 from syda_gym.envs.options import TeleopOptions
 from syda_gym.envs.rendering import Painter
 from syda_gym.envs.spaces import action_from_command, action_space, one_info, wishes
@@ -28,6 +28,8 @@ AUTORESET_MODES = {
     "same_step": AutoresetMode.SAME_STEP,
     "disabled": AutoresetMode.DISABLED,
 }
+
+_ANY = EpisodeWish()
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -140,7 +142,7 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         pending = self._pending
         fleet.step(actions, skip=pending)
         if pending.any():
-            self._restart(pending)
+            self._restart(pending, handed_out=False)
         self._pending = fleet.done
         return self._result(fleet.observe(), self._infos())
 
@@ -176,10 +178,10 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         infos.update(final_obs=final_obs, _final_obs=done, final_info=stacked, _final_info=done)
         return (fleet.observe(), *result, infos)
 
-    def _restart(self, mask: Flags) -> None:
+    def _restart(self, mask: Flags, *, handed_out: bool = True) -> None:
         which = np.flatnonzero(mask).tolist()
-        wish = wishes(self._fleet.repertoire, None, len(which))
-        self._fleet.reset(which, [self._rngs[index] for index in which], wish)
+        wish = [_ANY] * len(which)
+        self._fleet.reset(which, [self._rngs[index] for index in which], wish, handed_out=handed_out)
 
     def _result(self, observations: Observations, infos: dict[str, Any]) -> Result:
         fleet = self._fleet

@@ -61,6 +61,9 @@ class Backend(Protocol):
     def reset(self, which: NDArray[np.intp], q: FloatArray) -> None:
         """Puts robots ``which`` ``(k,)`` at rest at joint angles ``q`` ``(k, n)`` [rad]."""
 
+    def let_go(self) -> None:
+        """Copies the state arrays, so that a reset of some robots does not write into arrays that others hold."""
+
     def set_conditions(self, index: int, conditions: MotorConditions) -> None:
         """Changes motors and payload of one robot until they are changed again."""
 

@@ -75,7 +75,6 @@ class ServoWorld:
             self._show()
             return
         n = len(self._q)
-        self.pose, self.qd = self.pose.copy(), self.qd.copy()  # the old arrays may have been handed out
         self.pose[which, :n] = q
         self.pose[which, n:] = self._landmarks(self._q[:, which]).T
         self.qd[which] = 0.0
@@ -89,6 +88,10 @@ class ServoWorld:
         self._gain[:, index] = self.rates.motor_gain * conditions.gain / dt
         self._speed[:, index] = self._full_speed[:, 0] * conditions.speed
         self._kick[:, index] = self._constants.kick(conditions, dt)
+
+    def let_go(self) -> None:
+        """Copies the state arrays, so that a reset of some robots does not write into arrays that others hold."""
+        self.pose, self.qd = self.pose.copy(), self.qd.copy()
 
     def set_constants(self, constants: ServoConstants, index: int) -> None:
         """Takes other constants than those that were fitted, for one robot."""

@@ -76,8 +76,6 @@ class World:
         if len(which) == self.count:
             self.pose, self.qd = np.empty((self.count, n + self._puppets[0].n_points)), np.zeros((self.count, n))
             self.contacts = np.zeros(self.count, dtype=np.int64)
-        else:  # the old arrays may have been handed out
-            self.pose, self.qd, self.contacts = self.pose.copy(), self.qd.copy(), self.contacts.copy()
         for index, angles in zip(which.tolist(), q.tolist(), strict=True):
             puppet = self._puppets[index]
             puppet.reset(angles)
@@ -99,6 +97,10 @@ class World:
     def set_conditions(self, index: int, conditions: MotorConditions) -> None:
         """Changes motors and payload of one robot until they are changed again."""
         self._puppets[index].set_conditions(conditions)
+
+    def let_go(self) -> None:
+        """Copies the state arrays, so that a reset of some robots does not write into arrays that others hold."""
+        self.pose, self.qd, self.contacts = self.pose.copy(), self.qd.copy(), self.contacts.copy()
 
     def advance(self, commands: FloatArray) -> None:
         """Lets every robot follow its command ``(B, n)`` [rad] for one control step."""

@@ -1,0 +1,299 @@
+"""Measure the environment against its bars, as ratios, in one run on one core.
+
+Run it from anywhere: ``python scripts/benchmark_environment.py [--out FILE.json] [--quick]``. Times are CPU times of the
+measuring thread, so that other work on the machine disturbs them less; every figure is a median. The raw cost of physics
+is that of the bare ``stepSimulation`` calls while the robots make the very same motion.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from syda_gym.files import write_json
+
+OPTIONS: dict[str, Any] = {"route": ("adult", "pepper")}
+RATES = {"240 Hz, 8 substeps": 240.0, "60 Hz, 2 substeps": 60.0}
+STEPS = 60
+
+
+def cpu(function: Callable[[], object]) -> float:
+    """CPU seconds of one call."""
+    start = time.thread_time()
+    function()
+    return time.thread_time() - start
+
+
+def commands_of(env: Any, steps: int) -> list[np.ndarray]:
+    """Base commands of the first steps of every robot's clip, ``(B, n)`` each."""
+    fleet = env.unwrapped._fleet
+    return [fleet._scripts.base_of_all(np.full(fleet.count, step))[:, : fleet._n] for step in range(steps)]
+
+
+def raw_steps(env: Any, commands: list[np.ndarray]) -> float:
+    """CPU seconds in ``stepSimulation`` alone while the world of ``env`` follows the commands."""
+    import pybullet
+
+    world = env.unwrapped._fleet.world
+    substeps, clients, spent = world.rates.substeps, world._clients, 0.0
+    for command in commands:
+        for puppet, targets in zip(world._puppets, command.tolist(), strict=True):
+            puppet.command(targets)
+        start = time.thread_time()
+        for client in clients:
+            for _ in range(substeps):
+                pybullet.stepSimulation(client)
+        spent += time.thread_time() - start
+    return spent
+
+
+def against_raw(count: int, physics_hz: float, repeats: int) -> dict[str, float]:
+    """Share of the environment's time that is physics, for one environment or many robots in one world."""
+    if count == 1:
+        env: Any = gymnasium.make("SydaTeleop-v0", physics_hz=physics_hz, **OPTIONS)
+        action = np.zeros(10, dtype=np.float32)
+    else:
+        env = gymnasium.make_vec("SydaTeleop-v0", num_envs=count, physics_hz=physics_hz, **OPTIONS)
+        action = np.zeros((count, 10), dtype=np.float32)
+    env.reset(seed=0)
+    env.step(action)
+
+    def steps() -> None:
+        for _ in range(STEPS):
+            env.step(action)
+
+    shares, raws, wholes = [], [], []
+    for repeat in range(repeats):
+        env.reset(seed=repeat)
+        commands = commands_of(env, STEPS)
+        whole = cpu(steps)
+        env.reset(seed=repeat)
+        raw = raw_steps(env, commands)
+        shares.append(raw / whole)
+        raws.append(raw / STEPS)
+        wholes.append(whole / STEPS)
+    env.close()
+    return {
+        "share_of_raw": statistics.median(shares),
+        "raw_us": 1e6 * statistics.median(raws),
+        "step_us": 1e6 * statistics.median(wholes),
+    }
+
+
+def servo_vector(count: int, repeats: int) -> dict[str, float]:
+    """Control steps per second of the servo model, automatic resets included."""
+    env: Any = gymnasium.make_vec("SydaTeleop-v0", num_envs=count, physics="servo", start="uniform", **OPTIONS)
+    env.reset(seed=0)
+    actions = np.zeros((count, 10), dtype=np.float32)
+    for _ in range(20):
+        env.step(actions)
+    times = [cpu(lambda: [env.step(actions) for _ in range(20)]) / 20 for _ in range(repeats)]
+    env.close()
+    return {"step_us": 1e6 * statistics.median(times), "steps_per_s": count / statistics.median(times)}
+
+
+def reset_time() -> float:
+    """Seconds of a soft reset of one Bullet environment."""
+    env: Any = gymnasium.make("SydaTeleop-v0", **OPTIONS)
+    env.reset(seed=0)
+    times = [cpu(lambda: [env.reset() for _ in range(50)]) / 50 for _ in range(21)]
+    env.close()
+    return statistics.median(times)
+
+
+def frame_time(width: int, height: int) -> float:
+    """Seconds of one picture with ghost, operator and error colours."""
+    env: Any = gymnasium.make(
+        "SydaTeleop-v0", render_mode="rgb_array", camera={"width": width, "height": height}, **OPTIONS
+    )
+    env.reset(seed=0)
+    env.render()
+    times = []
+    for _ in range(40):
+        env.step(np.zeros(10))
+        times.append(cpu(env.render))
+    env.close()
+    return statistics.median(times)
+
+
+def memory() -> dict[str, float]:
+    """Megabytes, each measured in a fresh process that has imported everything and made one environment before."""
+    code = """
+import gc, json, sys
+import gymnasium, numpy as np, torch, stable_baselines3, pybullet, syda_gym
+def resident():
+    gc.collect()
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * 4096 / 2**20
+options = {"route": ("adult", "pepper")}
+kind = sys.argv[1]
+if kind == "one":
+    syda_gym.load_motions().pair("adult", "pepper")
+    gymnasium.make("SydaTeleop-v0", physics="servo", **options).close()
+    before = resident()
+    env = gymnasium.make("SydaTeleop-v0", **options)
+    env.reset(seed=0)
+    for _ in range(50):
+        env.step(np.zeros(10))
+elif kind == "resets":
+    env = gymnasium.make("SydaTeleop-v0", **options)
+    env.reset(seed=0)
+    for _ in range(1000):
+        env.reset()
+    before = resident()
+    for _ in range(10000):
+        env.reset()
+else:
+    def once():
+        env = gymnasium.make("SydaTeleop-v0", clips=[0, 1], **options)
+        env.reset(seed=0)
+        env.step(np.zeros(10))
+        env.close()
+    for _ in range(20):
+        once()
+    before = resident()
+    for _ in range(200):
+        once()
+print(json.dumps(resident() - before))
+"""
+    if not os.path.exists("/proc/self/statm"):
+        return {}
+    result = {}
+    for kind, label in (("one", "one_environment"), ("resets", "10000_resets"), ("makes", "200_make_close")):
+        done = subprocess.run([sys.executable, "-c", code, kind], capture_output=True, text=True, check=True)
+        result[label] = float(done.stdout.strip().splitlines()[-1])
+    return result
+
+
+def humanoid() -> dict[str, float] | None:
+    """Gymnasium's Humanoid-v5 against its own bare ``mj_step`` calls; ``None`` where it is not installed."""
+    try:
+        import mujoco
+
+        env: Any = gymnasium.make("Humanoid-v5")
+    except Exception:  # not installed, or versions that do not fit each other: a peer may be left out
+        return None
+    action = np.zeros(env.action_space.shape, dtype=np.float32)
+    inner, shares, wholes, resets = env.unwrapped, [], [], []
+    for repeat in range(15):
+        resets.append(cpu(lambda repeat=repeat: env.reset(seed=repeat)))  # type: ignore[misc]
+        whole = cpu(lambda: [env.step(action) for _ in range(20)])
+        env.reset(seed=repeat)
+        raw = 0.0
+        for _ in range(20):
+            inner.data.ctrl[:] = action
+            raw += cpu(lambda: mujoco.mj_step(inner.model, inner.data, nstep=inner.frame_skip))
+        shares.append(raw / whole)
+        wholes.append(whole / 20)
+    env.close()
+    return {
+        "share_of_raw": statistics.median(shares),
+        "step_us": 1e6 * statistics.median(wholes),
+        "reset_us": 1e6 * statistics.median(resets),
+    }
+
+
+def panda() -> dict[str, float] | None:
+    """panda-gym's PandaReach-v3 against its own bare ``stepSimulation`` calls; ``None`` where it is not installed."""
+    try:
+        import panda_gym  # noqa: F401
+        import pybullet
+
+        env: Any = gymnasium.make("PandaReach-v3")
+    except Exception:  # not installed, or versions that do not fit each other: a peer may be left out
+        return None
+    env.reset(seed=0)
+    action = np.zeros(env.action_space.shape, dtype=np.float32)
+    simulation, shares, wholes, resets = env.unwrapped.sim, [], [], []
+    client = simulation.physics_client._client
+    for _ in range(15):
+        resets.append(cpu(env.reset))
+        whole = cpu(lambda: [env.step(action) for _ in range(20)])
+        raw = cpu(lambda: [pybullet.stepSimulation(client) for _ in range(20 * simulation.n_substeps)])
+        shares.append(raw / whole)
+        wholes.append(whole / 20)
+    env.close()
+    return {
+        "share_of_raw": statistics.median(shares),
+        "step_us": 1e6 * statistics.median(wholes),
+        "reset_us": 1e6 * statistics.median(resets),
+    }
+
+
+def measure(quick: bool) -> dict[str, Any]:
+    """Everything."""
+    repeats = 5 if quick else 25
+    result: dict[str, Any] = {
+        "machine": {"python": platform.python_version(), "numpy": np.__version__, "gymnasium": gymnasium.__version__},
+        "single": {label: against_raw(1, hz, repeats) for label, hz in RATES.items()},
+        "sixteen": {label: against_raw(16, hz, max(3, repeats // 3)) for label, hz in RATES.items()},
+        "servo": {str(count): servo_vector(count, repeats) for count in (1, 32, 128, 1024)},
+        "reset_us": 1e6 * reset_time(),
+        "frame_ms": {"320x240": 1e3 * frame_time(320, 240), "640x480": 1e3 * frame_time(640, 480)},
+        "peers": {"Humanoid-v5": humanoid(), "PandaReach-v3": panda()},
+    }
+    raw = result["single"]["240 Hz, 8 substeps"]["raw_us"]
+    result["servo_times_raw"] = {count: values["steps_per_s"] * raw * 1e-6 for count, values in result["servo"].items()}
+    if not quick:
+        result["memory_mb"] = memory()
+    return result
+
+
+def table(result: dict[str, Any]) -> str:
+    """The figures as a Markdown table with their bars."""
+    rows = [("what", "measured", "bar")]
+    bars = {"240 Hz, 8 substeps": ("0.95", "0.90"), "60 Hz, 2 substeps": ("0.85", "0.90")}
+    for label, (one, many) in bars.items():
+        rows.append(
+            (f"one environment, {label}: share of raw physics", f"{result['single'][label]['share_of_raw']:.3f}", one)
+        )
+        rows.append(
+            (f"16 robots, {label}: share of raw physics", f"{result['sixteen'][label]['share_of_raw']:.3f}", many)
+        )
+    for count, ratio in result["servo_times_raw"].items():
+        bar = "400" if count == "1024" else ""
+        rows.append((f"servo model, {count} robots: times raw physics at 240 Hz", f"{ratio:.0f}", bar))
+    rows.append(("reset [ms]", f"{result['reset_us'] / 1000:.3f}", "0.1"))
+    rows.append(("picture 320x240 [ms]", f"{result['frame_ms']['320x240']:.2f}", "5"))
+    rows.append(("picture 640x480 [ms]", f"{result['frame_ms']['640x480']:.2f}", ""))
+    memories = {"one_environment": "60", "10000_resets": "0", "200_make_close": "0"}
+    for label, bar in memories.items():
+        if label in result.get("memory_mb", {}):
+            rows.append((f"memory, {label.replace('_', ' ')} [MB]", f"{result['memory_mb'][label]:.1f}", bar))
+    for peer, values in result["peers"].items():
+        if values:
+            rows.append((f"{peer}: share of its raw physics", f"{values['share_of_raw']:.3f}", ""))
+            rows.append((f"{peer}: reset [ms]", f"{values['reset_us'] / 1000:.3f}", ""))
+        else:
+            rows.append((f"{peer}", "not installed", ""))
+    lines = ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join([lines[0], "|---|---|---|", *lines[1:]])
+
+
+def main() -> None:
+    """Measures, prints the table, writes the figures."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", help="JSON file for all figures")
+    parser.add_argument("--quick", action="store_true", help="few repeats, no memory measurements")
+    arguments = parser.parse_args()
+    result = measure(arguments.quick)
+    print(table(result))
+    if arguments.out:
+        write_json(arguments.out, result)
+    else:
+        print(json.dumps(result, indent=1))
+
+
+if __name__ == "__main__":
+    main()
