@@ -18,8 +18,6 @@ RUNS: dict[str, tuple[list[str], str]] = {
     "fit_your_npz.py": ([], "unseen action"),
     "chain_by_hand.py": ([], "adult > kid > pepper"),
     "choose_a_route.py": ([], "record next"),
-    "live_udp.py": (["4"], "median latency"),
-    "new_robot.py": ([], "record next"),
     "train_a_residual.py": (["6144"], "residual on unseen actions"),
     "sb3_from_scratch.py": (["1024"], "after 1024 steps"),
     "live_udp.py": (["4"], "median latency"),

@@ -85,7 +85,7 @@ def make_pool(workers: str | int, motions: Motions) -> Pool:
 
     Args:
         workers: a number of processes, ``ray`` for a Ray cluster on this machine (or the one that ``RAY_ADDRESS``
-            names), or ``ray:ADDRESS`` for a running cluster. ``ray`` uses as many workers as the cluster has processors.
+            names), or ``ray:ADDRESS`` for a running cluster; ``ray`` takes as many workers as it has processors.
         motions: the data set, sent to every worker once.
 
     Raises:
