@@ -222,3 +222,16 @@ def test_the_command_line_adds_shows_and_lists_robots(tmp_path: Path, monkeypatc
     assert "LElbowRoll" in shown.output.replace("\n", "")
     assert "mine" in CliRunner().invoke(app, ["robot", "list"]).output
     catalog._build.cache_clear()
+
+
+def test_the_command_line_records_a_pair(tmp_path: Path) -> None:
+    from syda_gym.cli import app
+    from syda_gym.motions import read_dataset
+
+    out = tmp_path / "pairs"
+    options = ["--sink", "none", "--action", "wave_high", "--countdown", "0.1", "--calibration", "0.5"]
+    result = CliRunner().invoke(app, ["record", str(out), "--source", "replay:embedded", *options])
+    assert result.exit_code == 0, result.output
+    assert "mimic the robot now" in result.output
+    assert "wave_high" in result.output
+    assert len(read_dataset(out).pair("adult", "pepper")) > 40
