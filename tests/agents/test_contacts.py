@@ -1,0 +1,78 @@
+"""Contacts: projection leaves them by little, free poses alone, and avoiding references are free and smooth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from syda_gym.agents.agent import BaseAlone
+from syda_gym.agents.avoidance import avoiding
+from syda_gym.agents.classical import make_rival
+from syda_gym.agents.figures import jitter
+from syda_gym.agents.projection import Projection, capsule_model
+from syda_gym.agents.streams import Streams, score_streams
+from syda_gym.errors import AgentError
+from syda_gym.motions.synthetic import generate
+
+
+@pytest.fixture(scope="module")
+def crossing() -> Streams:
+    """Pepper's own motions that drive its arms into its body."""
+    motions = generate(("pepper",), seed=7, actions=("cross_chest", "reach_across"), variants=1)
+    frames = [take.frames["pepper"][20:80] for take in motions.takes]
+    reference = np.stack(frames)
+    return Streams(reference, np.zeros(reference.shape[:2]), reference, np.full(len(frames), 60))
+
+
+def test_projection_leaves_contact_and_moves_little(interface):
+    model = capsule_model(interface.robot)
+    rng = np.random.default_rng(0)
+    robot = interface.robot
+    poses = robot.clamp(rng.uniform(robot.lower, robot.upper, (600, interface.n)))
+    clear = model.clearance(poses)
+    touching = poses[(clear < 0.0) & (clear > -0.05)]
+    assert len(touching) > 10
+    projection = Projection(interface, BaseAlone(interface), margin=0.01)
+    found = projection.project(touching)
+    assert (model.clearance(found) > 0.0).mean() > 0.9
+    assert np.median(np.abs(found - touching).max(axis=1)) < 0.4
+    assert not robot.violations(found).any()
+
+
+def test_free_commands_pass_bit_for_bit(interface):
+    projection = Projection(interface, BaseAlone(interface), margin=0.005)
+    projection.reset(1)
+    rest = interface.robot.rest[None]
+    assert np.array_equal(projection.project(rest), rest)
+
+
+def test_the_projecting_rival_touches_far_less_than_the_base(interface, crossing, rates):
+    model = capsule_model(interface.robot)
+    base = score_streams(make_rival("base", interface), crossing, rates, capsules=model)
+    projected = score_streams(make_rival("projection", interface, margin=0.005), crossing, rates, capsules=model)
+    assert base.contact_steps > 0.2
+    assert projected.contact_steps < 0.4 * base.contact_steps  # the clips begin inside a contact
+
+
+def test_avoiding_references_are_free_near_the_old_ones_and_smoother_than_projection(interface, crossing):
+    model = capsule_model(interface.robot)
+    found = avoiding(crossing, interface, margin=0.01)
+    flat = found.reference.reshape(-1, interface.n)
+    assert (model.clearance(flat) > 0.0).mean() > 0.97
+    assert np.array_equal(found.base, crossing.base)
+    projection = Projection(interface, BaseAlone(interface), margin=0.01)
+    abrupt = projection.project(crossing.reference.reshape(flat.shape)).reshape(found.reference.shape)
+    robot = interface.robot
+    roughness = [sum(jitter(robot.landmarks(q)) for q in motion) for motion in (found.reference, abrupt)]
+    assert roughness[0] < roughness[1]
+
+
+def test_avoiding_leaves_motions_without_contact_as_they_are(interface):
+    rest = np.tile(interface.robot.rest, (1, 10, 1))
+    streams = Streams(rest, np.zeros((1, 10)), rest, np.array([10]))
+    assert np.array_equal(avoiding(streams, interface).reference, rest)
+
+
+def test_a_margin_out_of_range_is_refused(interface):
+    with pytest.raises(AgentError, match="margin"):
+        Projection(interface, BaseAlone(interface), margin=-0.1)
