@@ -40,12 +40,12 @@ def embedded() -> Motions:
 
 @pytest.fixture(scope="session")
 def small_motions(embedded: Motions) -> Motions:
-    """Six actions of adult, kid and Pepper at 10 Hz."""
+    """Two seconds of five actions of adult, kid and Pepper at 10 Hz."""
     slow = load_motions(embedded, fps=10)
-    actions = sorted({take.action for take in slow.takes})[::9]
+    actions = sorted({take.action for take in slow.takes})[::11]
     bodies = ("adult", "kid", "pepper")
     takes = tuple(
-        type(take)(take.recording, take.action, take.fps, {b: take.frames[b] for b in bodies}, take.mirrored)
+        type(take)(take.recording, take.action, take.fps, {b: take.frames[b][8:28] for b in bodies}, take.mirrored)
         for take in slow.takes
         if take.action in actions
     )

@@ -28,7 +28,7 @@ from syda_gym.evaluation.report import (
     write_report,
 )
 from syda_gym.evaluation.report.model import Block, Cell
-from syda_gym.evaluation.statistics import spearman
+from syda_gym.evaluation.statistics import iqm, spearman
 from syda_gym.files import read_json
 from syda_gym.motions.clip import Motions
 
@@ -157,7 +157,7 @@ def _headlines(results: Results, episodes: Results, curve: EfficiencyCurve | Non
     lines = []
     if episodes.rows:
         groups = episodes.groups(*_GROUP)
-        best = min(groups, key=lambda key: groups[key].estimate("landmark_error", resamples=1).value)
+        best = min(groups, key=lambda key: iqm(groups[key].values("landmark_error")))
         error = groups[best].estimate("landmark_error", over="actions")
         lines.append(
             Headline(
@@ -196,9 +196,7 @@ def _error_plot(episodes: Results) -> BarPlot:
 
 def _route_blocks(episodes: Results, motions: Motions, scores: Scores) -> list[Block]:
     first = episodes.select(**{name: episodes.rows[0][name] for name in ("method", "agent", "disturbance")})
-    errors = {
-        str(key[0]): group.estimate("mapping_error", resamples=1).value for key, group in first.groups("route").items()
-    }
+    errors = {str(key[0]): float(iqm(group.values("mapping_error"))) for key, group in first.groups("route").items()}
     bodies = {body: motions.bodies[body].kind for edge in scores for body in edge}
     edges = [RouteEdge(a, b, score, errors.get(f"{a}>{b}")) for (a, b), score in scores.items() if math.isfinite(score)]
     products = {
