@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import subprocess
 import sys
 import tarfile
@@ -20,13 +21,19 @@ LAZY = ("torch", "pybullet", "stable_baselines3", "pinocchio", "matplotlib", "yo
 
 
 @pytest.fixture(scope="module")
-def distributions(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
-    """File names inside the wheel and the source distribution."""
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the wheel and the source distribution."""
     out = tmp_path_factory.mktemp("dist")
     build = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(out), str(ROOT)]
     result = subprocess.run([*build, "--wheel", "--sdist"], capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stdout[-2000:] + result.stderr[-2000:]
-    wheel, sdist = next(out.glob("*.whl")), next(out.glob("*.tar.gz"))
+    return out
+
+
+@pytest.fixture(scope="module")
+def distributions(built: Path) -> dict[str, set[str]]:
+    """File names inside the wheel and the source distribution."""
+    wheel, sdist = next(built.glob("*.whl")), next(built.glob("*.tar.gz"))
     with tarfile.open(sdist) as archive:
         inside = {member.name.split("/", 1)[1] for member in archive.getmembers() if member.isfile()}
     return {"wheel": set(zipfile.ZipFile(wheel).namelist()), "sdist": inside}
@@ -64,6 +71,21 @@ def test_source_distribution_can_be_tested_and_documented(distributions: dict[st
     strangers = {name for name in inside if "/" in name and name.split("/")[0] not in allowed}
     assert not strangers
     assert not {name for name in inside if name.endswith((".xlsx", ".pyc", ".mp4"))}
+
+
+def test_wheel_works_outside_the_checkout(built: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(next(built.glob("*.whl"))) as wheel:
+        wheel.extractall(tmp_path / "installed")
+    code = (
+        "import gymnasium, syda_gym; print(syda_gym.__file__); env = gymnasium.make('SydaTeleop-v0');"
+        "env.reset(seed=0); env.step(0 * env.action_space.sample()); env.close(); print('stepped')"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "installed"), "OMP_NUM_THREADS": "1"}
+    command = [sys.executable, "-c", code]
+    result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr[-2000:]
+    assert str(tmp_path / "installed") in result.stdout
+    assert "stepped" in result.stdout
 
 
 def run(code: str) -> subprocess.CompletedProcess[str]:
