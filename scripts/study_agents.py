@@ -59,7 +59,7 @@ class Size:
     validation_episodes: int = 24
     budget: int = 20
     iterations: int = 300
-    steps: int = 100_000
+    steps: int = 300_000
     test_variants: int = 2
 
 
