@@ -105,8 +105,9 @@ class Solo(Fleet):
         truncated = self._now >= self._last
         terminated = options.terminate_error is not None and mean > options.terminate_error
         success = (truncated or terminated) and self._end(terminated)
+        observation = self._look(row, values)
         info = self._describe(k, row, target, error, distances, terms, jitter, hits, command, bool(success))
-        return self._look(row, values, info), reward, terminated, truncated, info
+        return observation, reward, terminated, truncated, info
 
     @property
     def present_base(self) -> FloatArray:
@@ -149,8 +150,8 @@ class Solo(Fleet):
         weights = self._weights
         return [-weights.limits * hits, -weights.contacts * contacts, -weights.jitter * jitter]
 
-    def _look(self, row: list[float], values: list[float], info: dict[str, Any]) -> NDArray[np.float32]:
-        """The observation after a step."""
+    def _look(self, row: list[float], values: list[float]) -> NDArray[np.float32]:
+        """The observation after a step; the next base command is looked up here."""
         n, k, scripts = self._n, self._now, self._scripts
         q = row[:n]
         ahead = scripts.base_row(k)
@@ -161,7 +162,6 @@ class Solo(Fleet):
         parts = [*scripts.operator_row(k), *errors, *q, *row[-n:], *values, scripts.age(k)]
         if self.options.history:
             parts += (self._past[0] - np.array(q)).ravel().tolist()
-        info["base"] = np.array(base)
         result = np.array(parts, dtype=np.float32)
         np.maximum(result, self._low, out=result)
         np.minimum(result, self._high, out=result)
@@ -180,21 +180,23 @@ class Solo(Fleet):
         command: list[float],
         success: bool,
     ) -> dict[str, Any]:
-        n, points = self._n, self._points
-        measured, wanted = np.array(row), np.array(target)
+        n, points, size = self._n, self._points, len(target)
+        # One array, cut into views: making an array costs more than its numbers.
+        numbers = np.array([*row, *target, *error[:n], *command, *self._base_values, *distances])
+        cuts = numbers[size + n :]
         return {
             "reward_terms": dict(zip(TERMS, terms, strict=True)),
-            "joint_error": np.array(error[:n]),
-            "landmark_error": np.array(distances),
+            "joint_error": cuts[size : size + n],
+            "landmark_error": cuts[size + 3 * n :],
             "jitter": jitter,
             "limit_hits": hits,
             "contacts": int(self.world.contacts[0]) if self.options.self_collision else 0,
-            "q": measured[:n],
-            "base": None,  # of the next step, filled in with the observation
-            "command": np.array(command),
-            "reference": wanted[:n],
-            "landmarks": measured[n:-n].reshape(points, 3),
-            "reference_landmarks": wanted[n:].reshape(points, 3),
+            "q": numbers[:n],
+            "base": cuts[size + 2 * n : size + 3 * n],
+            "command": cuts[size + n : size + 2 * n],
+            "reference": cuts[:n],
+            "landmarks": numbers[n:size].reshape(points, 3),
+            "reference_landmarks": cuts[n:size].reshape(points, 3),
             "packet_age": self._scripts.age(k),
             "frame": k,
             **self._labels,

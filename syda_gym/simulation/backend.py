@@ -54,9 +54,15 @@ class Backend(Protocol):
     robot: Robot
     rates: Rates
     count: int
-    pose: FloatArray
-    qd: FloatArray
     contacts: NDArray[np.int64]
+
+    @property
+    def pose(self) -> FloatArray:
+        """Joint angles and landmark coordinates."""
+
+    @property
+    def qd(self) -> FloatArray:
+        """Joint speeds."""
 
     def reset(self, which: NDArray[np.intp], q: FloatArray) -> None:
         """Puts robots ``which`` ``(k,)`` at rest at joint angles ``q`` ``(k, n)`` [rad]."""

@@ -22,6 +22,7 @@ Picture = NDArray[np.uint8]
 
 GHOST_COLOR = (0.25, 0.55, 1.0, 1.0)
 _GHOST_SHARE = 0.45
+_GHOST_FINEST = 0.012  # m; a ghost has no fingers, which are most of the triangles
 _GHOST_GAP = 2e-5  # of depth, so that a ghost that coincides with the robot does not flicker
 OPERATOR_AT = 0.95  # m to the robot's left
 _SKY_TOP, _SKY_BOTTOM = (0.97, 0.98, 1.0), (0.86, 0.89, 0.94)
@@ -121,6 +122,7 @@ class Camera:
                 self._ghost = PosedRobot(robot, self._ghost_client, urdf=view.appearance)
                 self._ghost.paint(GHOST_COLOR)
                 self._ghost.hide(self._ghost.still)
+                self._ghost.simplify(_GHOST_FINEST)
         except BaseException:
             self.close()
             raise

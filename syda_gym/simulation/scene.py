@@ -81,6 +81,19 @@ class PosedRobot:
         for link in links:
             self._bullet.changeVisualShape(self.body, link, rgbaColor=_HIDDEN, physicsClientId=self._client)
 
+    def simplify(self, radius: float) -> None:
+        """Hides round shapes of the arms that are thinner than ``radius`` [m], such as fingers."""
+        thin = (self._bullet.GEOM_SPHERE, self._bullet.GEOM_CYLINDER, self._bullet.GEOM_CAPSULE)
+        place: dict[int, int] = {}
+        for shape in self._bullet.getVisualShapeData(self.body, physicsClientId=self._client):
+            link, kind, size = shape[1], shape[2], shape[3]
+            place[link] = place.get(link, -1) + 1
+            thickness = size[0] if kind == self._bullet.GEOM_SPHERE else size[1]
+            if link in self.moving and kind in thin and thickness < radius:
+                self._bullet.changeVisualShape(
+                    self.body, link, shapeIndex=place[link], rgbaColor=_HIDDEN, physicsClientId=self._client
+                )
+
     def paint(self, color: Sequence[float]) -> None:
         """Gives all visible parts one colour."""
         for link in [-1, *self._links.values()]:

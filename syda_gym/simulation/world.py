@@ -64,8 +64,9 @@ class World:
         except BaseException:
             self.close()
             raise
-        self.pose = np.zeros((count, 0))
-        self.qd = np.zeros((count, 0))
+        self._pose = np.zeros((count, 0))
+        self._qd = np.zeros((count, 0))
+        self._pending: list[float] | None = None
         self.contacts = np.zeros(count, dtype=np.int64)
         self._settle(robot.rest.tolist())
         self.reset(np.arange(count), np.repeat(robot.rest[None], count, axis=0))
@@ -74,13 +75,14 @@ class World:
         """Puts robots ``which`` ``(k,)`` at rest at joint angles ``q`` ``(k, n)`` [rad]; nothing is reloaded."""
         n = len(self.robot.joint_names)
         if len(which) == self.count:
-            self.pose, self.qd = np.empty((self.count, n + self._puppets[0].n_points)), np.zeros((self.count, n))
+            width = n + self._puppets[0].n_points
+            self._pose, self._qd, self._pending = np.empty((self.count, width)), np.zeros((self.count, n)), None
             self.contacts = np.zeros(self.count, dtype=np.int64)
         for index, angles in zip(which.tolist(), q.tolist(), strict=True):
             puppet = self._puppets[index]
             puppet.reset(angles)
             row = puppet.read()
-            self.pose[index], self.qd[index] = row[:-n], row[-n:]
+            self._pose[index], self._qd[index] = row[:-n], row[-n:]
             self.contacts[index] = puppet.contacts() if self.self_collision else 0
 
     def _settle(self, rest: list[float]) -> None:
@@ -98,9 +100,28 @@ class World:
         """Changes motors and payload of one robot until they are changed again."""
         self._puppets[index].set_conditions(conditions)
 
+    @property
+    def pose(self) -> FloatArray:
+        """``(B, n + 6 * arms)``: joint angles [rad], then the landmarks' coordinates [m] in the torso frame."""
+        if self._pending is not None:
+            self._take(np.array([self._pending]))
+        return self._pose
+
+    @property
+    def qd(self) -> FloatArray:
+        """``(B, n)`` joint speeds [rad/s]."""
+        if self._pending is not None:
+            self._take(np.array([self._pending]))
+        return self._qd
+
+    def _take(self, state: FloatArray) -> None:
+        """Splits rows of joint angles, landmark coordinates and joint speeds into the state arrays."""
+        split = state.shape[1] - len(self.robot.joint_names)
+        self._pose, self._qd, self._pending = state[:, :split], state[:, split:], None
+
     def let_go(self) -> None:
         """Copies the state arrays, so that a reset of some robots does not write into arrays that others hold."""
-        self.pose, self.qd, self.contacts = self.pose.copy(), self.qd.copy(), self.contacts.copy()
+        self._pose, self._qd, self.contacts = self.pose.copy(), self.qd.copy(), self.contacts.copy()
 
     def advance(self, commands: FloatArray) -> None:
         """Lets every robot follow its command ``(B, n)`` [rad] for one control step."""
@@ -110,9 +131,7 @@ class World:
         for client in self._clients:
             for _ in substeps:
                 step(client)
-        state = np.array([puppet.read() for puppet in self._puppets])
-        split = state.shape[1] - len(self.robot.joint_names)
-        self.pose, self.qd = state[:, :split], state[:, split:]
+        self._take(np.array([puppet.read() for puppet in self._puppets]))
         if self.self_collision:
             self.contacts = np.array([puppet.contacts() for puppet in self._puppets], dtype=np.int64)
 
@@ -128,9 +147,7 @@ class World:
         for _ in range(self.rates.substeps):
             step(client)
         row = puppet.read()
-        state = np.array([row])
-        split = len(row) - len(command)
-        self.pose, self.qd = state[:, :split], state[:, split:]
+        self._pending = row  # becomes arrays only if someone asks for them
         if self.self_collision:
             self.contacts = np.array([puppet.contacts()], dtype=np.int64)
         return row
