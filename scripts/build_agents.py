@@ -1,24 +1,27 @@
-"""Writes the agents that are shipped, from a finished study: the best one per disturbance cell.
+"""Writes the agents that are shipped, from a finished study: the best one per route and disturbance cell.
 
     python scripts/study_agents.py --out study --seeds 5
     python scripts/build_agents.py --study study
 
-Which agent is best is decided on the validation motions alone: the tuned rivals, and of the predictors and residual
-policies the seed with the least objective. The test motions have no say.
+Candidates are the tuned rivals and every trained agent of the study. Which one is best is decided on validation motions
+alone, in the servo model, for each route anew; the test motions have no say. Agents read the base command whatever
+route it came by, so that those trained on adult > pepper also stand for election on adult > kid > pepper.
 """
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+
+from study_agents import CELLS, Study, stored_seeds
 
 from syda_gym.agents.bundle import load_agent, read_card, save_agent
-from syda_gym.agents.classical import make_rival
-from syda_gym.agents.runner import stored_interface
-from syda_gym.files import asset, read_json
+from syda_gym.agents.streams import score_streams
+from syda_gym.files import asset
 
-CELLS = ("lag", "noise", "latency", "noise-latency", "full")
+ROUTES = (("adult", "pepper"), ("adult", "kid", "pepper"))
+EPISODES = 24
+SEED = 7
 
 
 def main() -> None:
@@ -27,32 +30,31 @@ def main() -> None:
     parser.add_argument("--study", type=Path, default=Path("study"))
     parser.add_argument("--out", type=Path, default=asset("agents"))
     given = parser.parse_args()
-    learned = sorted(given.study.glob("*/*-[0-9].json"))
-    interface = stored_interface(read_card(learned[0]))
-    for cell in CELLS:
-        folder = given.study / cell
-        tuned = read_json(folder / "rivals.json")
-        name = min(tuned, key=lambda rival: float(tuned[rival]["validation"]["J"]))
-        best: tuple[float, Any, dict[str, Any]] = (
-            float(tuned[name]["validation"]["J"]),
-            make_rival(name, interface, **tuned[name]["settings"]),
-            {"tuned": name, "cell": cell},
-        )
-        for path in sorted(folder.glob("*-[0-9].json")):
-            card = read_card(path)
-            least = min(float(point["J"]) for point in card["figures"]["validation_curve"])
-            if least < best[0]:
-                best = (least, load_agent(path, interface), card["training"])
-        route = best[2].get("route", ["adult", "pepper"])
-        target = given.out / f"{'-'.join(route)}-{cell}"
-        save_agent(
-            best[1],
-            target,
-            mapping={"route": route, "method": "syda", "preset": "general", "motions": "embedded"},
-            training={**best[2], "command": f"scripts/build_agents.py --study {given.study.name}"},
-            figures={"validation": {"J": best[0], "cell": cell}},
-        )
-        print(f"{target.name}: {' > '.join(best[1].stack)}  validation J {best[0]:.2f}")
+    for route in ROUTES:
+        study = Study(given.study, 0, "full", route)
+        for cell in CELLS:
+            ground = study.ground("validation", cell)
+            streams = ground.record(EPISODES, seed=SEED)
+            candidates = study.rivals(cell)
+            paths = {path.stem: path for path in stored_seeds(study.folder(cell))}
+            candidates |= {name: load_agent(path, ground.interface) for name, path in paths.items()}
+            scores = {name: score_streams(agent, streams, ground.rates) for name, agent in candidates.items()}
+            best = min(scores, key=lambda name: scores[name].objective)
+            training = read_card(paths[best])["training"] if best in paths else {"tuned": best, "cell": cell}
+            target = given.out / f"{'-'.join(route)}-{study.folder(cell).name}"
+            save_agent(
+                candidates[best],
+                target,
+                mapping={"route": list(route), "method": "syda", "preset": "general", "motions": "embedded"},
+                training={**training, "selection": "scripts/build_agents.py", "selected_on": list(route)},
+                figures={
+                    "cell": cell,
+                    "validation": scores[best].as_dict(),
+                    "validation_of_base": scores["base"].as_dict(),
+                },
+            )
+            print(f"{target.name}: {best} ({' > '.join(candidates[best].stack)})  J {scores[best].objective:.2f}, base "
+                  f"{scores['base'].objective:.2f}", flush=True)  # fmt: skip
 
 
 if __name__ == "__main__":

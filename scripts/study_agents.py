@@ -249,6 +249,11 @@ def evaluate_all(study: Study) -> None:
         print(f"{cell} {level}: {len(next(iter(rows.values())))} episodes each of {len(agents)} agents", flush=True)
 
 
+def stored_seeds(folder: Path) -> list[Path]:
+    """Cards of the trained agents of a cell."""
+    return sorted(folder.glob("*-[0-9].json"))
+
+
 def _spread(ground: Ground, study: Study) -> list[int]:
     """Training clips spread over all actions."""
     return np.linspace(0, ground.clips - 1, min(study.size.tuning_episodes, ground.clips)).round().astype(int).tolist()

@@ -2,9 +2,9 @@
 
     python scripts/study_paper_agents.py DIR
 
-In each of three folds the mapping is fitted, and a residual policy trained, without three of the nine actions; base, lead
-and policy are then played on those three, against the recorded Pepper. Nine actions are too few to claim that anything
-generalises; the question is only whether an agent does harm.
+In each of three folds the mapping is fitted, and a residual policy trained, without three of the nine actions; base,
+lead and policy are then played on those three, against the recorded Pepper. Nine actions are too few to claim that
+anything generalises; the question is only whether an agent does harm.
 """
 
 from __future__ import annotations
