@@ -16,6 +16,8 @@ from syda_gym.mappings.mapping import Mapping
 
 __all__ = ["GuardedMapping", "Mapped"]
 
+_EVERY = 3
+
 
 class Mapped(NamedTuple):
     """One mapped frame: joint angles ``(n,)`` [rad], error bound [m] (NaN if unknown), out of distribution."""
@@ -52,11 +54,14 @@ class GuardedMapping:
         self.notices: list[str] = []
         self.bounded = self._knows("error_bound", "no error bound: the robot is not slowed by it")
         self._familiar = self._knows("unfamiliar", "no familiarity: unusual poses are not slowed")
+        self._count = 0
+        self._unfamiliar = False
         self._gains = [_gain(link) for link in self.links]
         try:
             self(_usual(mapping.source))
         except (SydaError, ArithmeticError, ValueError) as error:
             raise TeleoperationError(f"{mapping!r} cannot map a person who stands still: {error}") from error
+        self._count = 0
 
     def __call__(self, frame: FloatArray) -> Mapped:
         """Maps one frame ``(F,)`` of the mapping's source.
@@ -64,17 +69,22 @@ class GuardedMapping:
         Raises:
             SydaError: whatever the mapping raises on a frame that it cannot take.
         """
+        # Familiarity changes slowly; a look at every third frame is enough and saves time.
+        look = self._familiar and self._count % _EVERY == 0
+        self._count += 1
         current, bound, unfamiliar = frame, 0.0, False
         for link, gain in zip(self.links, self._gains, strict=True):
             if self.bounded:
                 bound = bound * gain + float(link.error_bound(current)[0])
-            current, odd = self._through(link, current)
+            current, odd = self._through(link, current, look)
             unfamiliar = unfamiliar or odd
+        if look:
+            self._unfamiliar = unfamiliar
         if not np.isfinite(current).all():
             raise TeleoperationError(f"{self.mapping!r} gave joint angles that are not finite")
-        return Mapped(current, bound if self.bounded else float("nan"), unfamiliar)
+        return Mapped(current, bound if self.bounded else float("nan"), self._unfamiliar)
 
-    def _through(self, link: Mapping, frame: FloatArray) -> tuple[FloatArray, bool]:
+    def _through(self, link: Mapping, frame: FloatArray, look: bool) -> tuple[FloatArray, bool]:
         """One link's image of a frame and whether the frame was unfamiliar to it."""
         if isinstance(link, CodedMapping) and link.confidence is not None:
             # Image and familiarity rest on the same code; asking for each would encode the frame twice.
@@ -82,8 +92,8 @@ class GuardedMapping:
             image = link.target_coder.decode(link.regressor(codes))[0]
             if isinstance(link.target, Robot) and link.target is not self.robot:
                 image = link.target.clamp(image)[0]  # the last robot's limits are the limiter's business
-            return image, self._familiar and bool(link.confidence.unfamiliar(codes)[0])
-        return link(frame), self._familiar and bool(link.unfamiliar(frame)[0])
+            return image, look and bool(link.confidence.unfamiliar(codes)[0])
+        return link(frame), look and bool(link.unfamiliar(frame)[0])
 
     def _knows(self, question: str, notice: str) -> bool:
         """Whether every link answers; links that were fitted on too little, or not fitted at all, do not."""

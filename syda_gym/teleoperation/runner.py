@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Callable
 
@@ -50,6 +51,9 @@ def run(
     """
     stats = statistics or LiveStatistics()
     driver = _Driver(source, loop, sink, journal, stats, on_decision)
+    # What exists now stays; the collector need not look at it again in the middle of a frame.
+    gc.collect()
+    gc.freeze()
     try:
         end = None if seconds is None else source.clock() + seconds
         while end is None or source.clock() < end:
@@ -58,6 +62,8 @@ def run(
                 break
     except KeyboardInterrupt:
         pass
+    finally:
+        gc.unfreeze()
     if rest_at_end and loop.state is not State.STOPPED:
         driver.go_to_rest()
     if journal is not None:

@@ -15,6 +15,7 @@ from syda_gym.errors import OptionError
 __all__ = ["SelfCollision"]
 
 _SAMPLES = 256
+_SMALL = 1e-3  # rad
 _ALWAYS = 0.5  # pairs that touch in more than this share of random poses overlap by construction
 
 
@@ -144,8 +145,8 @@ class SelfCollision:
         return result
 
     def _try(self, pose: FloatArray, end: FloatArray, part: slice) -> bool:
-        """Moves part of a pose to ``end`` if the way is free."""
-        if (pose[part] == end[part]).all():
+        """Moves part of a pose to ``end`` if the way is free; steps too small to matter are not worth a check."""
+        if float(np.abs(end[part] - pose[part]).max()) < _SMALL:
             return True
         moved = pose.copy()
         moved[part] = end[part]
