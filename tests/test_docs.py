@@ -95,12 +95,13 @@ def commands() -> list[tuple[str, str]]:
     found = []
     for path in PAGES:
         for block in blocks(path):
-            if block.language in ("console", "bash", "sh", "shell"):
-                text = block.text.replace("\\\n", " ")
-                for line in text.splitlines():
-                    line = line.strip().removeprefix("$ ")
-                    if line and not line.startswith("#"):
-                        found.append((name(path), line))
+            if block.language not in ("console", "bash", "sh", "shell", ""):
+                continue
+            for line in block.text.replace("\\\n", " ").splitlines():
+                command = line.strip().removeprefix("$ ")
+                # A block without a language may be a drawing; there only our own commands are meant.
+                if command.startswith("syda-gym ") or (block.language and command and command[0] != "#"):
+                    found.append((name(path), command))
     return found
 
 
