@@ -82,8 +82,12 @@ class BulletSink(Sink):
             EmbodimentError: PyBullet cannot load the robot.
         """
         from syda_gym.simulation.camera import Camera, CameraView
-        from syda_gym.simulation.window import Window
+        from syda_gym.simulation.window import Window, has_display
 
+        if self.window and not has_display():
+            raise OptionError(
+                "the sink 'window' needs a display ($DISPLAY is not set); use 'bullet' or 'video:FILE.mp4'"
+            )
         view = CameraView.resolve({"operator": False, "distance": 1.6 * self.robot.height, **self.camera})
         if self.window:
             self._eye = Window(self.robot, self.operator or self.robot, view, float(self.rates.control_hz))
