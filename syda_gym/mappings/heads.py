@@ -37,7 +37,7 @@ class HeadedRegressor(Regressor):
 
     def __call__(self, codes: FloatArray) -> FloatArray:
         """Main and extra codes, side by side."""
-        main = self.main(codes[..., : self.width])
+        main = self.main(codes if codes.shape[-1] == self.width else codes[..., : self.width])
         return main if self.head is None else np.concatenate([main, self.head(codes)], axis=-1)
 
     def inverse(self) -> HeadedRegressor:

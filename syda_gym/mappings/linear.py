@@ -30,6 +30,8 @@ class Ridge(Regressor):
         self.scale = scale
         self.weight = weight
         self.bias = bias
+        self._slope = weight / scale.spread[:, None]
+        self._offset = bias - scale.mean @ self._slope
 
     @classmethod
     def fit(
@@ -67,7 +69,7 @@ class Ridge(Regressor):
 
     def __call__(self, codes: FloatArray) -> FloatArray:
         """Affine map of codes ``(..., D)``."""
-        return self.scale(codes) @ self.weight + self.bias
+        return codes @ self._slope + self._offset
 
     def arrays(self) -> Arrays:
         """Weights."""
