@@ -60,7 +60,7 @@ class Size:
     budget: int = 20
     iterations: int = 300
     steps: int = 300_000
-    test_variants: int = 2
+    test_variants: int = 1
 
 
 SIZES = {"full": Size(), "small": Size(1, 48, 12, 8, 3, 24, 20_000, 1)}
@@ -121,7 +121,7 @@ class Study:
         """Clean motions of the operator; the disturbances bring the noise."""
         families = {"train": TRAIN, "validation": VALIDATION, "test": TEST}[part]
         seed = {"train": 101, "validation": 102, "test": 103}[part]
-        variants = self.size.variants if part == "train" else self.size.test_variants
+        variants = {"train": self.size.variants, "validation": 2, "test": self.size.test_variants}[part]
         return generate((self.route[0],), seed=seed, families=families, variants=variants, noise=0.0, name=part)
 
     def folder(self, cell: str) -> Path:

@@ -72,8 +72,8 @@ def test_evaluation_meets_every_agent_with_the_same_disturbances_and_the_lead_he
 
 
 def test_bullet_and_servo_agree_on_an_agent(tiny_options, ground):
-    agents = {"kalman": make_rival("kalman", ground.interface, process=5.0)}
-    tiny_options = {**tiny_options, "disturbances": "teleop:latency:test"}
+    agents = {"kalman": make_rival("kalman", ground.interface, strength=0.5)}
+    tiny_options = {**tiny_options, "disturbances": None, "reference": "mapped"}
     found = [
         mean_of(evaluate({**tiny_options, "physics": physics}, agents, clips=[1], seed=2)["kalman"])
         for physics in ("bullet", "servo")
