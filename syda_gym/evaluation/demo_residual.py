@@ -23,6 +23,7 @@ from syda_gym.motions.clip import Motions
 
 if TYPE_CHECKING:
     from syda_gym.agents.agent import Agent
+    from syda_gym.agents.config import ResidualConfig
     from syda_gym.agents.training import Trained
     from syda_gym.mappings.mapping import Mapping
 
@@ -186,7 +187,7 @@ def train_and_compare(
     held_out: Sequence[str],
     seed: int = 0,
     *,
-    preset: str = PRESET,
+    config: ResidualConfig | None = None,
     links: Links | None = None,
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[float], None] | None = None,
@@ -198,7 +199,7 @@ def train_and_compare(
         route: the chain that gives the base command.
         held_out: actions for the comparison.
         seed: of the fits, the training and the episodes.
-        preset: hyper-parameters, of ``agents.config.preset_names()``.
+        config: hyper-parameters; the preset ``PRESET`` if ``None``.
         links: fitted links to take the chain from; fitted anew if ``None``.
         folder: where ``residual.safetensors`` and ``residual.json`` are stored; nowhere if ``None``.
         progress: told the finished fraction.
@@ -214,10 +215,10 @@ def train_and_compare(
     mapping = (links or Links(motions, seed=seed, groups=[tuple(held_out)])).chain(route, held_out)
     training = [name for name in motions.pair(route[0], route[-1]).action_names if name not in held_out]
     options: dict[str, Any] = {"operator": route[0], "robot": route[-1], "mapping": mapping, "motions": motions}
-    config = ResidualConfig.preset(preset)
+    settings = config or ResidualConfig.preset(PRESET)
     trained = train_residual(
         {**options, "actions": training},
-        config,
+        settings,
         seed=seed,
         progress=lambda done: tell(0.8 * done),
     )
@@ -231,7 +232,7 @@ def train_and_compare(
     for place, (name, agent) in enumerate(agents.items()):
         results.append(_played(mapping, motions, held_out, name, agent, seed))
         tell(0.8 + 0.2 * (place + 1) / len(agents))
-    untrained = ResidualPolicy.untrained(interface, BaseAlone(interface), scale=config.scale)
+    untrained = ResidualPolicy.untrained(interface, BaseAlone(interface), scale=settings.scale)
     equal = _same_start(mapping, motions, held_out, untrained, results[0].recordings[0], seed)
     result = ResidualResult(tuple(route), mapping, tuple(held_out), trained, equal, tuple(results))
     if folder is not None:
@@ -239,7 +240,7 @@ def train_and_compare(
             trained.agent,
             os.path.join(folder, "residual"),
             mapping=mapping.card.to_json(),
-            training={"config": config.as_dict(), "seed": seed, "actions": training},
+            training={"config": settings.as_dict(), "seed": seed, "actions": training},
             figures={"held_out": list(held_out), "change_m": result.change().to_dict()},
         )
     return result

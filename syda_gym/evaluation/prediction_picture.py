@@ -53,9 +53,10 @@ def prediction_png(
         best = scores[name]
         axis.set_title(f"{name}\nall {best.all.value:.2f}, choice {best.choice.value:.2f}", fontsize=10)
         axis.set_xlabel("rank, best predicted first", fontsize=9)
+        axis.set_xlim(-0.03, 1.03)
         axis.tick_params(labelsize=8)
     panels[0].set_ylabel("held-out error / target's arm length", fontsize=9)
-    panels[0].legend(fontsize=8, loc="upper left", markerscale=1.8)
+    panels[-1].legend(fontsize=8, loc="upper left", markerscale=1.8)
     kind = "synthetic motions" if study.synthetic else study.motions
     figure.suptitle(f"{len(study.routes)} routes among {len(study.bodies)} bodies, {kind}", fontsize=11)
     FigureCanvasAgg(figure)

@@ -163,7 +163,7 @@ def _headlines(results: Results, episodes: Results, curve: EfficiencyCurve | Non
             Headline(
                 f"Least landmark error: {best[0]}",
                 f"{100 * error.value:.1f} cm",
-                f"{best[1]}, agent {best[2]}, disturbance {best[3]}; {100 * error.low:.1f} to {100 * error.high:.1f} cm",
+                f"{100 * error.low:.1f} to {100 * error.high:.1f} cm; {best[1]}, {best[2]}, disturbance {best[3]}",
                 "good",
             )
         )
