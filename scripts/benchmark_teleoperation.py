@@ -4,6 +4,7 @@
     python scripts/benchmark_teleoperation.py throughput
     python scripts/benchmark_teleoperation.py violations --data FOLDER
     python scripts/benchmark_teleoperation.py network --hours 1
+    python scripts/benchmark_teleoperation.py fuzz --inputs 1000000
 
 ``FOLDER`` holds ``paper``, ``kinect`` and ``bvh``. Every part prints one JSON object. Pin the process to one core, for
 example with ``taskset -c 1``.
@@ -44,15 +45,22 @@ from syda_gym.teleoperation.statistics import LiveStatistics
 def main() -> None:
     """Runs the part that was asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("part", choices=["latency", "throughput", "violations", "network"])
+    parser.add_argument("part", choices=["latency", "throughput", "violations", "network", "fuzz"])
     parser.add_argument("--frames", type=int, default=10_000)
     parser.add_argument("--rate", type=float, default=30.0)
     parser.add_argument("--hours", type=float, default=1.0)
+    parser.add_argument("--inputs", type=int, default=1_000_000)
     parser.add_argument("--data", type=Path)
     parser.add_argument("--mapping", default="syda")
     parser.add_argument("--route", default="auto", help="auto, or bodies such as adult,kid,pepper")
     args = parser.parse_args()
-    parts = {"latency": latency, "throughput": throughput, "violations": violations, "network": network}
+    parts = {
+        "latency": latency,
+        "throughput": throughput,
+        "violations": violations,
+        "network": network,
+        "fuzz": fuzz,
+    }
     print(json.dumps(parts[args.part](args), indent=1))
 
 
@@ -270,6 +278,42 @@ def network(args: argparse.Namespace) -> dict[str, Any]:
         "replayed_bit_for_bit": replay.exact,
         "seconds": took,
     }
+
+
+def fuzz(args: argparse.Namespace) -> dict[str, Any]:
+    """Broken packets: bytes flipped, cut, doubled, exchanged for pieces of JSON; each is read or refused."""
+    body = catalog.get("adult")
+    decoder, rng = PacketDecoder(body), np.random.default_rng(0)
+    good = [
+        encode_frame(7, 1.5, np.arange(18) / 9.0, confidence=0.5),
+        b'{"v":1,"seq":1,"t":0.5,"control":"pause"}',
+        b'{"v":1,"seq":2,"t":1,"joints":{"LShoulder":[0,0,0],"LElbow":[0,0,1],"Head":[1,2,3]}}',
+    ]
+    pieces = [
+        b"NaN", b"-Infinity", b"null", b"true", b"[]", b"{}", b'""', b"1e999", b"-0", b"1e-400", b"9" * 400, b"\\ud800",
+        b"[" * 50, b'{"":' * 20, b",", b":", b'"', b"\xff", b"\x00", b'"frame":', b'"control":"stop"', b'"v":1',
+    ]  # fmt: skip
+    outcome: dict[str, int] = {}
+    for _ in range(args.inputs):
+        data = bytearray(good[int(rng.integers(len(good)))])
+        for _ in range(int(rng.integers(1, 5))):
+            at, how = int(rng.integers(len(data) + 1)), rng.random()
+            if how < 0.4:
+                data[at : at + 1] = bytes([int(rng.integers(256))])
+            elif how < 0.7:
+                data[at : at + int(rng.integers(12))] = pieces[int(rng.integers(len(pieces)))]
+            elif how < 0.85:
+                del data[at : at + int(rng.integers(1, 60))]
+            else:
+                data[at:at] = data[: int(rng.integers(60))]
+        try:
+            packet = decoder(bytes(data))
+            sound = packet.frame is None or bool(np.isfinite(packet.frame).all() and packet.frame.shape == (18,))
+            reason = "read" if sound and 0.0 <= packet.tracking <= 1.0 else "UNSOUND"
+        except PacketError as error:
+            reason = error.reason
+        outcome[reason] = outcome.get(reason, 0) + 1
+    return {"inputs": args.inputs, "outcome": dict(sorted(outcome.items(), key=lambda item: -item[1]))}
 
 
 def _receiver(mapping: Mapping) -> tuple[TeleoperationLoop, PacketDecoder, Ordering, Inbox]:
