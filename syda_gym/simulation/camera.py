@@ -52,7 +52,7 @@ class CameraView:
 
     width: int = 480
     height: int = 360
-    distance: float = 2.75
+    distance: float = 3.0
     yaw: float = 0.0
     pitch: float = 8.0
     fov: float = 42.0
@@ -224,7 +224,7 @@ class Camera:
         view, bullet = self.view, self._bullet
         side = 0.5 * OPERATOR_AT if self._operator is not None else 0.0
         height = max(self._robot.height, self._operator.height if self._operator is not None else 0.0)
-        center = np.array([0.0, side, self._floor + 0.5 * height])
+        center = np.array([0.0, side, self._floor + 0.56 * height])  # raised hands need room
         yaw, pitch = np.radians(view.yaw), np.radians(view.pitch)
         away = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
         eye = center + view.distance * away
