@@ -26,7 +26,7 @@ What `syda_gym.embodiments.discovery.discover` found, without any hint, in the U
 {two} of its {all} URDFs have two arms. The others are quadrupeds, drones, single arms, single hands and one file that
 no parser takes. Written by `scripts/study_robots.py`.
 
-Joints per arm; the links whose origins are shoulder, elbow, wrist and tip (left arm; the right one is its mirror image
+Joints per arm; the links whose origins are shoulder, elbow, wrist and tip (left arm; the right one has its counterparts
 in every robot listed); upper arm and forearm; T from the adult to the robot and back (`general` definition); and which
 of Pepper and NAO is the better stop on the way from the adult, if a lab has the pairs adult-Pepper, adult-NAO,
 Pepper-robot and NAO-robot.
