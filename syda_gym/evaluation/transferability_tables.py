@@ -90,8 +90,9 @@ def prediction_table(study: PredictionStudy, full: bool = False) -> Table:
     scores = study.full_scores if full else study.scores
     rows: list[list[Cell]] = [[s.name, s.all, s.metres, s.pairs, s.choice, s.regret] for s in scores]
     kind = "synthetic" if study.synthetic else "recorded"
+    among = "those with two arms of " if full else ""
     note = (
-        f"{scores[0].all.count} routes among {'those with two arms of ' if full else ''}{len(study.bodies)} bodies ({', '.join(study.bodies)}), {kind} motions, "
+        f"{scores[0].all.count} routes among {among}{len(study.bodies)} bodies ({', '.join(study.bodies)}), {kind} motions, "
         f"{study.folds} groups of actions held out in turn. 95 % bootstrap intervals over pairs of ends."
     )
     which = ", routes of two-armed bodies alone" if full else ""
