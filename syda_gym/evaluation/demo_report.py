@@ -80,7 +80,7 @@ def write_demo_report(
     write_video(folder / "chains.mp4", _film(shown, names, title, tell), _SHOWN_HZ)
     sections = [
         Section("Playback", [_playback(result)]),
-        Section("Which way to go", [_graph(result), transferability_table(result)]),
+        Section("Which way to go", [_graph(result), transferability_table(result), _regions(result)]),
         Section("How good the chains are", [*_chain_words(result), chain_table(result), landmarks, joints]),
         *([Section("The residual policy", result.residual.blocks())] if result.residual else []),
         Section(
@@ -233,6 +233,15 @@ def _headlines(result: DemoResult, best: ChainResult) -> list[Headline]:
 
 def _chosen_routes(result: DemoResult) -> list[tuple[str, ...]]:
     return [route.bodies for route in result.chosen.values()]
+
+
+def _regions(result: DemoResult) -> Picture:
+    """Where the robot can stand in for the first operator, after Fig. 3 of the paper."""
+    from syda_gym.transferability.pictures import clouds_png
+
+    operator = next(iter(result.chosen))
+    png = clouds_png(result.motions.bodies[operator], result.robot, samples=2**18)
+    return Picture(f"Where {result.robot.name} can move as {operator} does", png)
 
 
 def _best_chain(result: DemoResult) -> ChainResult:

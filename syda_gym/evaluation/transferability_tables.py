@@ -92,8 +92,8 @@ def prediction_table(study: PredictionStudy, full: bool = False) -> Table:
     kind = "synthetic" if study.synthetic else "recorded"
     among = "those with two arms of " if full else ""
     note = (
-        f"{scores[0].all.count} routes among {among}{len(study.bodies)} bodies ({', '.join(study.bodies)}), {kind} motions, "
-        f"{study.folds} groups of actions held out in turn. 95 % bootstrap intervals over pairs of ends."
+        f"{scores[0].all.count} routes among {among}{len(study.bodies)} bodies ({', '.join(study.bodies)}), "
+        f"{kind} motions, {study.folds} groups of actions held out in turn; 95 % bootstrap intervals over ends."
     )
     which = ", routes of two-armed bodies alone" if full else ""
     return Table(f"Does it predict? Spearman with the held-out error, 1 is perfect{which}", columns, rows, note)
