@@ -143,10 +143,11 @@ class Robot(Embodiment):
         self.description = description
         self.name = description.name
         self.height = description.height
+        given = [arm.side for arm in description.arms]
+        if not given or len(set(given)) != len(given) or not set(given) <= set(SIDES):
+            raise EmbodimentError(f"robot {self.name!r}: describe one left and/or one right arm, got sides {given}")
         arms = sorted(description.arms, key=lambda arm: SIDES.index(arm.side))
         self.sides = tuple(arm.side for arm in arms)
-        if not arms or len(set(self.sides)) != len(arms):
-            raise EmbodimentError(f"robot {self.name!r}: describe one left and/or one right arm, got {self.sides}")
         tree = read_urdf(description.urdf)
         self.joint_names = tuple(joint for arm in arms for joint in arm.joints)
         limits = tree.limits(self.joint_names)

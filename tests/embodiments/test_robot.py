@@ -141,6 +141,8 @@ def test_bad_arms_are_named(tmp_path):
         Robot.read(_description(tmp_path, arms=reordered))
     with pytest.raises(EmbodimentError, match="must have a length"):
         Robot.read(_description(tmp_path, arms=[{**arms[0], "elbow": arms[0]["shoulder"]}, arms[1]]))
+    with pytest.raises(EmbodimentError, match=r"one left and/or one right arm, got sides \['left', 'righ'\]"):
+        Robot.read(_description(tmp_path, arms=[arms[0], {**arms[1], "side": "righ"}]))
 
 
 def test_what_is_no_urdf_is_refused(tmp_path):
