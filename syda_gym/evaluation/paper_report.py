@@ -20,7 +20,7 @@ __all__ = ["PRINTED", "overview", "tables", "write_study"]
 
 PRINTED: dict[str, Any] = {
     "table2": {
-        # pair: 1-S, 1-D, alpha, T, E [m]
+        # pair: 1-S, 1-D, alpha, T, E (m)
         "H2-R1": (0.8878, 0.3561, 1.0, 0.2358, 0.0691),
         "H1-R1": (0.8884, 0.3564, 0.76, 0.2335, 0.0718),
         "R1-H1": (0.6738, 0.0606, 0.76, 0.2002, 0.1368),
@@ -84,7 +84,7 @@ def overview(study: Study, protocol: str) -> Table:
         )
     names = ("H2>R1", "H1>R1", "R1>H1", "R1>H2", "H2-H1-R1", "H1-H2-R1")
     return Table(
-        f"Errors E [m], {protocol}, mean ± s.d. over seeds",
+        f"Errors E (m), {protocol}, mean ± s.d. over seeds",
         [
             Column("method"),
             *(Column(name) for name in names),
@@ -126,7 +126,7 @@ def _table2(study: Study, t: dict[str, dict[str, float]]) -> Table:
         "Table 2: transferability and error of the pairs, ours (printed)",
         [Column(title) for title in titles],
         rows,
-        note="E [m]. rand3 is the paper's protocol, with SyDa as published. The two right columns are leave-one-action-"
+        note="E (m). rand3 is the paper's protocol, with SyDa as published. The two right columns are leave-one-action-"
         "out, with SyDa as published and with the general preset.",
     )
 
@@ -151,7 +151,7 @@ def _chain_table(study: Study, name: str) -> Table:
         f"{name.title()[:5]} {name[-1]}: chain {chain}",
         [Column("method"), Column("link"), *(Column(joint) for joint in _JOINTS), Column("average"), Column("seeds")],
         rows,
-        note="E [m], mean ± s.d. over frames as the paper prints it; last column: s.d. of the mean over seeds. "
+        note="E (m), mean ± s.d. over frames as the paper prints it; last column: s.d. of the mean over seeds. "
         "The end pair is never fitted. 'all rows': the link into Pepper is fitted to all its rows, as in the paper; "
         "'LOAO': without the action that is scored.",
     )
@@ -183,7 +183,7 @@ def _table5(study: Study, t: dict[str, dict[str, float]]) -> Table:
             )
         ],
         rows,
-        note="E [m], mean ± s.d. over seeds.",
+        note="E (m), mean ± s.d. over seeds.",
     )  # fmt: skip
 
 
@@ -239,7 +239,7 @@ def _plot(study: Study, protocol: str, path: Path) -> None:
     axes.set_ylabel("error E [cm]")
     axes.set_title(f"{study.data}, {protocol}, {study.seeds} seeds", fontsize=10)
     axes.grid(axis="y", alpha=0.3)
-    axes.legend(fontsize=7, ncol=4)
+    figure.legend(fontsize=7, ncol=6, loc="outside lower center")
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=130)
 
