@@ -3,9 +3,10 @@
     python scripts/study_agents.py --out study --seeds 5
     python scripts/build_agents.py --study study
 
-Candidates are the tuned rivals and every trained agent of the study. Which one is best is decided on validation motions
-alone, in the servo model, for each route anew; the test motions have no say. Agents read the base command whatever
-route it came by, so that those trained on adult > pepper also stand for election on adult > kid > pepper.
+Candidates are the tuned rivals and the agents trained on the cell or on the full suite. Which one is best is decided on
+validation motions alone, in the servo model, for each route anew; the test motions have no say. Agents read the base
+command whatever route it came by, so that those trained on adult > pepper also stand for election on
+adult > kid > pepper.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ def main() -> None:
             streams = ground.record(EPISODES, seed=SEED)
             candidates = study.rivals(cell)
             paths = {path.stem: path for path in stored_seeds(study.folder(cell))}
+            paths |= {f"full-{path.stem}": path for path in stored_seeds(study.folder("full"))}
             candidates |= {name: load_agent(path, ground.interface) for name, path in paths.items()}
             scores = {name: score_streams(agent, streams, ground.rates) for name, agent in candidates.items()}
             best = min(scores, key=lambda name: scores[name].objective)
