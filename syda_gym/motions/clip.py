@@ -345,6 +345,9 @@ class Motions:
                 if body not in self.bodies:
                     raise MotionError(f"{self.name}: take {take.recording!r} has frames of unknown body {body!r}")
 
+    def __repr__(self) -> str:
+        return f"Motions({self.name!r}, {len(self.takes)} takes of {', '.join(self.bodies)})"
+
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
         """Unordered pairs of bodies that share a take, each sorted by the order of ``bodies``."""
