@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.evaluation.statistics import estimate, iqm, probability_of_improvement
-from syda_gym.files import read_json, write_text
+from syda_gym.files import read_json, write_json, write_text
 
 CELLS = (
     ("lag", "test"),
@@ -79,6 +79,22 @@ def table(cell: Cell) -> list[str]:
             f"{interval.low:.2f} to {interval.high:.2f} | {better.value:.2f} |"
         )
     return [*lines, ""]
+
+
+def numbers(cells: Mapping[tuple[str, str], Cell]) -> dict[str, Any]:
+    """The tables as plain data."""
+    result: dict[str, Any] = {}
+    for (name, level), cell in cells.items():
+        rival = cell.values(cell.best_rival, "J")
+        for condition in cell.conditions():
+            values = cell.values(condition, "J")
+            interval = estimate(values, cell.actions)
+            entry = {figure: iqm(cell.values(condition, figure)) for figure in ("landmark_mm", "joint_mrad", "jitter")}
+            entry |= {"J": interval.value, "J_low": interval.low, "J_high": interval.high}
+            entry["beats_rival"] = probability_of_improvement(values, rival, cell.actions, cell.actions).value
+            entry["seeds"] = cell.seeds[condition]
+            result.setdefault(f"{name}:{level}", {})[condition] = entry
+    return result
 
 
 def ratio(cell: Cell, condition: str, baseline: str, figure: str, which: NDArray[np.bool_] | None = None) -> float:
@@ -207,10 +223,25 @@ def main() -> None:
         for name, level in CELLS
         if (given.study / name / f"test-{level}.json").is_file()
     }
-    text = [*bars(cells)]
+    source = ["<!-- numbers: docs/results/agents.json -->", ""]
+    text = [*source, *bars(cells)]
     for cell in cells.values():
-        text += table(cell)
-    write_text(given.out / "study-agents-tables.md", "\n".join(["# Study of agents: tables", "", *text]))
+        lines = table(cell)
+        first = next(index for index, line in enumerate(lines) if line.startswith("|"))
+        text += [*lines[:first], *source, *lines[first:]]
+    write_json(given.out / "results" / "agents.json", {"bars": bars(cells), "cells": numbers(cells)})
+    write_text(
+        given.out / "study-agents-tables.md",
+        "\n".join(
+            [
+                "# Study of agents: tables",
+                "",
+                "<!-- numbers: this page, written by scripts/report_agents.py -->",
+                "",
+                *text,
+            ]
+        ),
+    )
     curve_picture(cells, given.out / "images" / "agents-error-jitter.png")
     learning_picture(given.study, given.out / "images" / "agents-learning.png")
 
