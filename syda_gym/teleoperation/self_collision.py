@@ -119,7 +119,10 @@ class SelfCollision:
         """Whether the straight way from ``start`` (known to be free) to ``end`` is free, tested every ``step`` rad."""
         if not self.available:
             return True
-        count = max(1, math.ceil(float(np.max(np.abs(end - start))) / step))
+        farthest = float(np.abs(end - start).max())
+        if farthest <= step:
+            return not self.touches(end)
+        count = math.ceil(farthest / step)
         return not any(self.touches(start + (end - start) * (i / count)) for i in range(count, 0, -1))
 
     def allowed(self, start: FloatArray, end: FloatArray) -> FloatArray:
@@ -187,9 +190,9 @@ class SelfCollision:
         )
         rng = np.random.default_rng(0)
         poses = self.robot.clamp(rng.uniform(self.robot.lower, self.robot.upper, (_SAMPLES, len(self.robot.lower))))
-        often = np.mean([self._hits(pose) for pose in poses], axis=0) > _ALWAYS
+        frequency = np.mean([self._hits(pose) for pose in poses], axis=0)
         # Pairs within the margin at rest would never let the robot start.
-        left_out = often | np.array(self._hits(self.robot.rest), dtype=bool)
+        left_out = (frequency > _ALWAYS) | np.array(self._hits(self.robot.rest), dtype=bool)
         self.ignored = tuple(
             sorted(
                 {
@@ -200,6 +203,8 @@ class SelfCollision:
             )
         )
         self._keep(list(~left_out))
+        # The check ends at the first hit; pairs that touch often come first.
+        self._keep([True] * int((~left_out).sum()), np.argsort(-frequency[~left_out], kind="stable").tolist())
 
     def _within_reach(self) -> Callable[[int, int], bool]:
         """Tells which pairs can meet at all: each shape stays in a ball about the first joint of its arm.
@@ -231,16 +236,16 @@ class SelfCollision:
 
         return meet
 
-    def _keep(self, chosen: list[bool]) -> None:
-        """Keeps only the chosen pairs of shapes and renews the buffers that depend on them."""
+    def _keep(self, chosen: list[bool], order: list[int] | None = None) -> None:
+        """Keeps only the chosen pairs of shapes, perhaps in another order, and renews what depends on them."""
         import pinocchio
 
         # Indices first: the list's elements are references into a vector that changes under removal.
         pairs = [(pair.first, pair.second) for pair in self._shapes.collisionPairs]
         self._shapes.removeAllCollisionPairs()
-        for (first, second), keep in zip(pairs, chosen, strict=True):
-            if keep:
-                self._shapes.addCollisionPair(pinocchio.CollisionPair(first, second))
+        for index in range(len(pairs)) if order is None else order:
+            if chosen[index]:
+                self._shapes.addCollisionPair(pinocchio.CollisionPair(*pairs[index]))
         self._data = pinocchio.Data(self._model)
         self._shape_data = pinocchio.GeometryData(self._shapes)
         for request in self._shape_data.collisionRequests:
