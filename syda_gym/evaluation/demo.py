@@ -14,7 +14,7 @@ import numpy as np
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, StorageError, nearest_name
 from syda_gym.evaluation.chains import Links, Route, action_groups, all_routes, name_of, robots_of
-from syda_gym.evaluation.episodes import EpisodeFigures, Recording, figures_of, latency, make_env, play_all
+from syda_gym.evaluation.episodes import EpisodeFigures, Recording, figures_of_all, latency, make_env, play_all
 from syda_gym.evaluation.statistics import Estimate, clustered_estimate
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
@@ -285,12 +285,13 @@ def _play_chain(
         mapping = links.chain(route, group)
         env = make_env(mapping, motions, group, self_collision=True)
         try:
-            for recording in play_all(env, base_alone(env), seed):
-                episodes.append(figures_of(recording, env.robot, mapping))
+            recordings = list(play_all(env, base_alone(env), seed))
+            episodes += figures_of_all(recordings, env.robot, mapping)
+            for recording in recordings:
                 if len(shown) < 3 and recording.action not in {one.action for one, _ in shown}:
                     shown.append((recording, mapping))
             if index == 0:
-                seconds.append(latency(mapping, None, recording.operator))
+                seconds.append(latency(mapping, None, recordings[0].operator))
         finally:
             env.close()
     return ChainResult(route, product, tuple(episodes), tuple(shown), float(np.median(seconds)))

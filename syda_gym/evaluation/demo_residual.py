@@ -15,7 +15,7 @@ import numpy as np
 
 from syda_gym.embodiments.embodiment import landmark_error
 from syda_gym.evaluation.chains import Links, Route, name_of
-from syda_gym.evaluation.episodes import EpisodeFigures, Recording, figures_of, make_env, play_all
+from syda_gym.evaluation.episodes import EpisodeFigures, Recording, figures_of_all, make_env, play_all
 from syda_gym.evaluation.report import BarPlot, Column, CurvePlot, Headline, PlaybackChain, Table, Text
 from syda_gym.evaluation.report.model import Block, Cell
 from syda_gym.evaluation.statistics import Estimate, clustered_estimate
@@ -254,7 +254,7 @@ def _played(
     try:
         recordings = tuple(play_all(env, agent, seed))
         tracking = tuple(float(landmark_error(env.robot, one.q, one.base).mean()) for one in recordings)
-        figures = tuple(figures_of(one, env.robot, mapping) for one in recordings)
+        figures = tuple(figures_of_all(recordings, env.robot, mapping))
         return AgentResult(name, figures, tracking, recordings)
     finally:
         env.close()

@@ -19,7 +19,17 @@ if TYPE_CHECKING:
     from syda_gym.envs.teleop import SydaTeleopEnv
     from syda_gym.mappings.mapping import Mapping
 
-__all__ = ["FIGURES", "EpisodeFigures", "Recording", "figures_of", "latency", "make_env", "play", "play_all"]
+__all__ = [
+    "FIGURES",
+    "EpisodeFigures",
+    "Recording",
+    "figures_of",
+    "figures_of_all",
+    "latency",
+    "make_env",
+    "play",
+    "play_all",
+]
 
 AgentMaker = Callable[["SydaTeleopEnv"], "Agent"]
 """Builds an agent for an environment."""
@@ -203,22 +213,44 @@ def play_all(env: SydaTeleopEnv, agent: Agent, seed: int = 0) -> Iterator[Record
 
 
 def figures_of(recording: Recording, robot: Robot, mapping: Mapping, capsules: Any = None) -> EpisodeFigures:
-    """Sums an episode up.
+    """Sums an episode up; see ``figures_of_all``."""
+    return figures_of_all([recording], robot, mapping, capsules)[0]
+
+
+def figures_of_all(
+    recordings: Sequence[Recording], robot: Robot, mapping: Mapping, capsules: Any = None
+) -> list[EpisodeFigures]:
+    """Sums episodes of one chain up; together, because the mapping is asked once for all their frames.
 
     Args:
-        recording: of the episode.
+        recordings: of the episodes.
         robot: who was driven.
         mapping: the chain that gave the base command.
         capsules: a ``simulation.capsules.CapsuleModel`` of the robot to count self-collisions by geometry, where the
             physics did not; ``None`` to count the contacts of the physics.
     """
+    if not recordings:
+        return []
+    frames = np.concatenate([recording.operator for recording in recordings])
+    cuts = np.cumsum([len(recording) for recording in recordings])[:-1]
+    outside = np.split(robot.violations(mapping.raw(frames), tolerance=1e-6), cuts)
+    bound = _bound(mapping, frames)
+    bounds = [None] * len(recordings) if bound is None else np.split(bound, cuts)
+    return [
+        _figures(recording, robot, capsules, violated, width)
+        for recording, violated, width in zip(recordings, outside, bounds, strict=True)
+    ]
+
+
+def _figures(
+    recording: Recording, robot: Robot, capsules: Any, outside: NDArray[np.bool_], bound: FloatArray | None
+) -> EpisodeFigures:
     q, reference = recording.q, recording.reference
     joints = np.abs(q - reference).mean(axis=0)
     landmarks = recording.landmark_error.mean(axis=0)
     mapped = landmark_error(robot, recording.base, reference).mean(axis=1)
     speeds = np.abs(np.diff(recording.command, axis=0)) * recording.fps
     touching = recording.contacts > 0 if capsules is None else np.asarray(capsules.clearance(q)) < 0.0
-    bound = _bound(mapping, recording.operator)
     return EpisodeFigures(
         motion=recording.motion,
         action=recording.action,
@@ -231,7 +263,7 @@ def figures_of(recording: Recording, robot: Robot, mapping: Mapping, capsules: A
         success=recording.success,
         jitter=float(recording.jitter[3:].mean()) if len(recording) > 3 else 0.0,
         speed_violations=float((speeds > robot.speed * (1.0 + 1e-6)).mean()) if len(speeds) else 0.0,
-        limit_violations=float(robot.violations(mapping.raw(recording.operator), tolerance=1e-6).mean()),
+        limit_violations=float(outside.mean()),
         self_collisions=float(touching.mean()),
         coverage=float("nan") if bound is None else float((mapped <= bound).mean()),
         bound=float("nan") if bound is None else float(bound.mean()),

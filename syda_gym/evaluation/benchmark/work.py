@@ -17,7 +17,7 @@ from syda_gym.errors import AgentError, MappingError
 from syda_gym.evaluation.benchmark.cells import Cell
 from syda_gym.evaluation.benchmark.config import split_method
 from syda_gym.evaluation.chains import Links, action_groups
-from syda_gym.evaluation.episodes import FIGURES, Recording, figures_of, latency, make_env, play_all
+from syda_gym.evaluation.episodes import FIGURES, Recording, figures_of_all, latency, make_env, play_all
 from syda_gym.motions.clip import Motions, PairedMotions
 
 if TYPE_CHECKING:
@@ -111,17 +111,15 @@ class Worker:
         try:
             agent = self._agent(cell, settings, mapping, group, env)
             capsules = None if bullet else CapsuleModel(env.robot)
-            rows = []
-            for recording in play_all(env, agent, cell.seed):
-                figures = figures_of(recording, env.robot, mapping, capsules).to_dict()
-                rows.append(_row(cell, fold, figures))
-                if not shown:
-                    shown.append(_shown(recording, mapping, figures["bound"]))
+            recordings = list(play_all(env, agent, cell.seed))
+            figures = figures_of_all(recordings, env.robot, mapping, capsules)
+            if not shown:
+                shown.append(_shown(recordings[0], mapping, figures[0].bound))
             if fold == 0:
                 observation, _ = env.reset(seed=cell.seed)
                 agent.reset(1, cell.seed)
-                timing["latency"] = latency(mapping, agent, recording.operator, observation)
-            return rows
+                timing["latency"] = latency(mapping, agent, recordings[0].operator, observation)
+            return [_row(cell, fold, one.to_dict()) for one in figures]
         finally:
             env.close()
 
