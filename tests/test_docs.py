@@ -84,7 +84,7 @@ def test_python_runs(path: Path, tmp_path: Path) -> None:
         env=environment,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=600,
         check=False,
     )
     assert result.returncode == 0, f"lines are those of {name(path)}\n{result.stderr[-3000:]}"
