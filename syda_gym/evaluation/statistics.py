@@ -173,7 +173,13 @@ def clustered_estimate(
         return Estimate(point, point, point, len(array))
     rng = np.random.default_rng(seed)
     draws = rng.integers(len(groups), size=(resamples, len(groups)))
-    sampled = [float(statistic(np.concatenate([groups[i] for i in row]), axis=-1)) for row in draws]
+    sampled = np.empty(resamples)
+    # Clusters differ in size, so samples differ in length; those of one length are aggregated together.
+    lengths = np.array([len(group) for group in groups])[draws].sum(axis=1)
+    for length in np.unique(lengths):
+        rows = np.flatnonzero(lengths == length)
+        samples = np.array([np.concatenate([groups[i] for i in draws[row]]) for row in rows])
+        sampled[rows] = statistic(samples, axis=-1)
     low, high = np.quantile(sampled, [(1 - confidence) / 2, (1 + confidence) / 2])
     return Estimate(point, float(low), float(high), len(array))
 
