@@ -93,7 +93,7 @@ class Ground:
         ]
         base, age, reference, operator = (np.stack([part[i] for part in parts]) for i in range(4))
         return Streams(
-            base,
+            self.repertoire.limited(base),
             age,
             reference,
             np.array([self.repertoire.clips[clip].length for clip in plays], dtype=np.int64),
@@ -146,13 +146,12 @@ class Ground:
         first: int,
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         robot, entry, n = self.repertoire.robot, self.repertoire.clips[clip], self.interface.n
-        target = self.repertoire.target_rows[entry.first : entry.first + entry.length + 1, :n]
+        freeze = 0.0 if drawn is None else drawn.freeze_elbow_yaw
+        target = self.repertoire.target_rows(freeze)[entry.rows, :n]
         age = np.zeros(entry.length + 1)
         if drawn is not None:
-            base = freeze_elbow_yaw(robot, base, drawn.freeze_elbow_yaw)
+            base = freeze_elbow_yaw(robot, base, freeze)
             age = np.minimum((np.arange(entry.length + 1) - newest) * self.rates.dt, MAX_AGE)
-            if self.options.reference == "mapped":
-                target = freeze_elbow_yaw(robot, target, drawn.freeze_elbow_yaw)
         pad = self.repertoire.longest - entry.length
 
         def padded(array: FloatArray) -> FloatArray:

@@ -1,4 +1,9 @@
-"""Repertoire: the clips that an environment replays, as flat tables that a step only has to look up."""
+"""Repertoire: the clips that an environment replays, as flat tables that a step only has to look up.
+
+A mapping works frame by frame, so what it asks for may jump: closed-form kinematics change their branch where an arm
+passes beside the head. Base commands and mapped references therefore go through the causal speed limiter of
+``mappings.limits``, clip by clip at the control rate; it leaves motions within the limits as they are.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +11,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.robot import Robot
+from syda_gym.envs.disturbances import freeze_elbow_yaw
 from syda_gym.envs.options import TeleopOptions
 from syda_gym.envs.pilot import Pilot, PlannedRoute
 from syda_gym.errors import EmbodimentError, MotionError, OptionError, RouteError, nearest_name
+from syda_gym.mappings.limits import limit_speed, step_towards
 from syda_gym.motions.clip import MotionClip, Motions, Take
 from syda_gym.motions.loading import load_motions, resampled
 
@@ -28,6 +36,11 @@ class ClipEntry:
     first: int
     length: int
 
+    @property
+    def rows(self) -> slice:
+        """Its rows in the tables, the repeated last one included."""
+        return slice(self.first, self.first + self.length + 1)
+
 
 class Repertoire:
     """Clips at the control rate, with base commands of every planned route.
@@ -40,7 +53,6 @@ class Repertoire:
         clips: the clips.
         routes: the routes that an episode may take.
         operator_rows: ``(rows, F)`` operator frames.
-        target_rows: ``(rows, n + 6 * arms)``: the reference's joint angles [rad] and landmark coordinates [m].
     """
 
     def __init__(self, options: TeleopOptions) -> None:
@@ -50,7 +62,7 @@ class Repertoire:
         if not isinstance(robot, Robot):
             raise EmbodimentError(f"robot={robot.name!r} is a {robot.kind}; choose a robot such as 'pepper'")
         self.robot = robot
-        self._reference = options.reference
+        self._control_hz = float(options.control_hz)
         source, target = _clips(motions, options, self.operator.name, robot.name)
         self.pilot = Pilot(
             motions,
@@ -65,12 +77,10 @@ class Repertoire:
         self.routes: list[PlannedRoute] = list(self.pilot.plan(options.route))
         self.clips = _entries(source)
         self.operator_rows = _padded([clip.frames for clip in source])
-        self._base: dict[int, FloatArray] = {}
-        self.base_rows(0)  # now, so that a mapping that cannot be fitted says so at once
-        if options.reference == "paired":
-            self.target_rows = self._with_landmarks(_padded([clip.frames for clip in target]))
-        else:
-            self.target_rows = self._with_landmarks(self.base_rows(0))
+        self._mapped: dict[int, FloatArray] = {}
+        self._targets: dict[float, FloatArray] = {}
+        self.mapped_rows(0)  # now, so that a mapping that cannot be fitted says so at once
+        self._paired_rows = _padded([clip.frames for clip in target]) if options.reference == "paired" else None
 
     @property
     def longest(self) -> int:
@@ -82,16 +92,48 @@ class Repertoire:
         """Names of the clips."""
         return [clip.name for clip in self.clips]
 
-    def base_rows(self, route: int) -> FloatArray:
-        """Base commands along a route, ``(rows, n)`` [rad]; mapped on first use."""
-        if route not in self._base:
-            self._base[route] = self.map(route, self.operator_rows)
-        return self._base[route]
+    def mapped_rows(self, route: int) -> FloatArray:
+        """What the mappings of a route make of each operator frame, ``(rows, n)`` [rad]; mapped on first use."""
+        if route not in self._mapped:
+            self._mapped[route] = self.map(route, self.operator_rows)
+        return self._mapped[route]
+
+    def target_rows(self, freeze: float = 0.0) -> FloatArray:
+        """The reference of every frame, ``(rows, n + 6 * arms)``: joint angles [rad], landmark coordinates [m].
+
+        Args:
+            freeze: a mapped reference holds the joint that turns the elbow as ``disturbances.freeze_elbow_yaw`` does.
+        """
+        if freeze not in self._targets:
+            q = self._reference_rows(freeze)
+            self._targets[freeze] = np.hstack([q, self.robot.landmarks(q).reshape(len(q), -1)])
+        return self._targets[freeze]
 
     def map(self, route: int, frames: FloatArray) -> FloatArray:
-        """Operator frames ``(N, F)`` to base commands ``(N, n)`` [rad] along a route, within the joint limits."""
+        """Operator frames ``(N, F)`` to joint angles ``(N, n)`` [rad] along a route, within the joint limits."""
         mapping = self.pilot.mapping(self.routes[route].bodies)
         return self.robot.clamp(mapping(frames))
+
+    def limited(self, commands: FloatArray) -> FloatArray:
+        """Commands at the control rate, ``(N, n)`` or ``(B, N, n)`` [rad], within the joint speed limits."""
+        return limit_speed(self.robot, commands, self._control_hz)
+
+    def base_with_preview(self, mapped: FloatArray, newest: NDArray[np.intp], preview: int) -> FloatArray:
+        """Base commands of one episode, with those that follow if one more frame arrives at every step.
+
+        Args:
+            mapped: what the mapping makes of each frame, ``(N, n)`` [rad].
+            newest: the newest frame at hand at each step, ``(steps,)``.
+            preview: steps to look ahead.
+
+        Returns:
+            ``(steps, (preview + 1) n)`` [rad].
+        """
+        columns = [self.limited(mapped[newest])]
+        for ahead in range(1, preview + 1):
+            goal = mapped[np.minimum(newest + ahead, len(mapped) - 1)]
+            columns.append(step_towards(self.robot, columns[-1], goal, self._control_hz))
+        return np.hstack(columns)
 
     def clip_index(self, which: int | str) -> int:
         """Index of a clip by index or name.
@@ -117,8 +159,13 @@ class Repertoire:
             return len(self.routes) - 1
         return known.index(tuple(bodies))
 
-    def _with_landmarks(self, q: FloatArray) -> FloatArray:
-        return np.hstack([q, self.robot.landmarks(q).reshape(len(q), -1)])
+    def _reference_rows(self, freeze: float) -> FloatArray:
+        if self._paired_rows is not None:
+            return self._paired_rows
+        q = self.mapped_rows(0).copy()
+        for clip in self.clips:
+            q[clip.rows] = self.limited(freeze_elbow_yaw(self.robot, q[clip.rows], freeze))
+        return q
 
 
 def _body(motions: Motions, body: object, what: str, *, needed: bool = True) -> Embodiment:

@@ -40,7 +40,7 @@ class Scripts:
         self.lengths = np.array([clip.length for clip in repertoire.clips], dtype=np.intp)
         self._firsts = np.array([clip.first for clip in repertoire.clips], dtype=np.intp)
         self._freeze = 0.0 if self._disturbances is None else self._disturbances.freeze_elbow_yaw
-        self._target_rows = self._frozen_targets(options.reference)
+        self._target_rows = repertoire.target_rows(self._freeze)
         self._target_at = np.zeros(count, dtype=np.intp)
         self._base_at = np.zeros(count, dtype=np.intp)
         self._operator_at = np.zeros(count, dtype=np.intp)
@@ -139,36 +139,16 @@ class Scripts:
         """Age of the newest packet [s]."""
         return 0.0 if self._disturbances is None else float(self._age_rows[self._reader[1] + k])
 
-    def _frozen_targets(self, reference: str) -> FloatArray:
-        repertoire, n = self._repertoire, len(self._repertoire.robot.joint_names)
-        if reference == "paired" or self._freeze <= 0.0:
-            return repertoire.target_rows
-        q = self._freeze_clips(repertoire.target_rows[:, :n])
-        return np.hstack([q, repertoire.robot.landmarks(q).reshape(len(q), -1)])
-
-    def _freeze_clips(self, q: FloatArray) -> FloatArray:
-        robot, result = self._repertoire.robot, q.copy()
-        for clip in self._repertoire.clips:
-            rows = slice(clip.first, clip.first + clip.length + 1)
-            result[rows] = freeze_elbow_yaw(robot, q[rows], self._freeze)
-        return result
-
     def _route_offset(self, route: int) -> int:
         """Row at which the base commands of a route begin; they are appended when the route is first taken."""
         rows = len(self._repertoire.operator_rows)
         if route not in self._known_routes:
-            base = self._repertoire.base_rows(route)
-            ahead = [np.arange(clip.length + 1) for clip in self._repertoire.clips]
-            shifted = [
-                np.concatenate(
-                    [
-                        base[clip.first + np.minimum(times + step, clip.length)]
-                        for clip, times in zip(self._repertoire.clips, ahead, strict=True)
-                    ]
-                )
-                for step in range(self._preview + 1)
+            mapped = self._repertoire.mapped_rows(route)
+            pages = [
+                self._repertoire.base_with_preview(mapped[clip.rows], np.arange(clip.length + 1), self._preview)
+                for clip in self._repertoire.clips
             ]
-            self._base_rows = np.vstack([self._base_rows, np.hstack(shifted)])
+            self._base_rows = np.vstack([self._base_rows, *pages])
             self._known_routes.append(route)
         return rows * self._known_routes.index(route)
 
@@ -180,11 +160,9 @@ class Scripts:
         packets = np.arange(first, length + 1)
         rows = self._firsts[clip] + np.clip(packets, 0, length)
         seen = see(drawn, repertoire.operator, repertoire.operator_rows[rows], rng)
-        base = freeze_elbow_yaw(robot, repertoire.map(route, seen), drawn.freeze_elbow_yaw)
+        mapped = freeze_elbow_yaw(robot, repertoire.map(route, seen), drawn.freeze_elbow_yaw)
         newest = deliver(drawn, first, length, frame, self._dt, rng)
         page = slice(index * self._page + frame, index * self._page + length + 1)
         self._operator_rows[page] = seen[newest - first]
-        self._base_rows[page] = np.hstack(
-            [base[np.minimum(newest - first + step, len(base) - 1)] for step in range(self._preview + 1)]
-        )
+        self._base_rows[page] = repertoire.base_with_preview(mapped, newest - first, self._preview)
         self._age_rows[page] = np.minimum((np.arange(frame, length + 1) - newest) * self._dt, MAX_AGE)

@@ -29,7 +29,8 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     """Replays an operator's motion on a robot; an agent corrects what the mapping asks for.
 
     A person (the *operator*) moves; a mapping, or a chain of mappings along a *route* of bodies, turns every frame into
-    joint angles for the robot, the *base command*; the agent adds a *correction* before the motors follow. The motion
+    joint angles for the robot, the *base command*; the agent adds a *correction* before the motors follow. Where a
+    mapping asks for more than the joints' top speed, the base command goes there as fast as the motors can. The motion
     that the robot should have made is known frame by frame, because both were recorded together. One episode replays
     one clip.
 

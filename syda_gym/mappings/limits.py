@@ -9,7 +9,7 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
 
-__all__ = ["SpeedLimiter", "limit_speed", "speed_violations"]
+__all__ = ["SpeedLimiter", "limit_speed", "speed_violations", "step_towards"]
 
 _SLACK = 1e-12  # rad; rounding of q + (t - q) must not count as motion beyond the limit
 
@@ -17,8 +17,8 @@ _SLACK = 1e-12  # rad; rounding of q + (t - q) must not count as motion beyond t
 class SpeedLimiter:
     """Moves joint angles towards a target as fast as the speed limits allow, one frame at a time.
 
-    The step is ``q += clip(target - q, -v dt, v dt)`` per joint. Hence a target that itself obeys the limits is
-    reached exactly in every frame (no lag), and a faster one is followed at full speed.
+    A target that itself obeys the limits is reached exactly in every frame (no lag), and a faster one is followed at
+    full speed, see ``step_towards``.
 
     Args:
         robot: whose limits hold.
@@ -29,48 +29,61 @@ class SpeedLimiter:
     """
 
     def __init__(self, robot: Robot, fps: float) -> None:
-        if not (np.isfinite(fps) and fps > 0):
-            raise OptionError(f"fps must be positive, got {fps}")
-        self.robot = robot
-        self._step = robot.speed / float(fps)
+        _step(robot, fps)
+        self.robot, self.fps = robot, fps
         self._last: FloatArray | None = None
 
     def reset(self, frame: ArrayLike | None = None) -> None:
         """Starts anew, at ``frame`` ``(n,)`` [rad] or wherever the next target is."""
-        self._last = None if frame is None else self.robot.clamp(np.asarray(frame, dtype=np.float64))[0]
+        self._last = None if frame is None else self.robot.clamp(np.asarray(frame, dtype=np.float64))
 
     def __call__(self, target: ArrayLike) -> FloatArray:
         """The next joint angles ``(n,)`` [rad] on the way to ``target`` ``(n,)``."""
-        goal = self.robot.clamp(np.asarray(target, dtype=np.float64))[0]
-        if self._last is None:
-            self._last = np.asarray(goal, dtype=np.float64)
-            return self._last
-        step = goal - self._last
-        if (np.abs(step) <= self._step + _SLACK).all():
-            self._last = np.asarray(goal, dtype=np.float64)
-            return self._last
-        moved = self._last + np.clip(step, -self._step, self._step)
-        # A coupled limit may have moved with its governing joint; the governed joint follows it.
-        self._last = np.asarray(self.robot.clamp(moved)[0], dtype=np.float64)
-        return self._last
+        goal = self.robot.clamp(np.asarray(target, dtype=np.float64))
+        self._last = goal if self._last is None else step_towards(self.robot, self._last, goal, self.fps)
+        return np.asarray(self._last[0])
 
 
-def limit_speed(robot: Robot, frames: ArrayLike, fps: float) -> FloatArray:
-    """Applies ``SpeedLimiter`` to a whole sequence.
+def step_towards(robot: Robot, last: FloatArray, goal: FloatArray, fps: float) -> FloatArray:
+    """One frame on the way to a goal: per joint ``q += clip(goal - q, -v dt, v dt)``.
 
     Args:
         robot: whose limits hold.
-        frames: ``(N, n)`` joint angles [rad] of one clip in time order.
+        last: ``(B, n)`` joint angles [rad] of the frame before.
+        goal: ``(B, n)`` joint angles [rad] within the joint limits; joints that can reach them do so exactly.
         fps: frames per second.
 
     Returns:
-        ``(N, n)`` [rad].
+        ``(B, n)`` [rad]; no row depends on another.
     """
-    q = robot.clamp(robot.check(frames))
-    if not speed_violations(robot, q, fps).any():
+    most = _step(robot, fps)
+    step = goal - last
+    near = np.abs(step) <= most + _SLACK
+    if near.all():
+        return goal
+    # A coupled limit may have moved with its governing joint; the governed joint follows it.
+    return robot.clamp(np.where(near, goal, last + np.clip(step, -most, most)))
+
+
+def limit_speed(robot: Robot, frames: ArrayLike, fps: float) -> FloatArray:
+    """Applies ``SpeedLimiter`` to whole clips.
+
+    Args:
+        robot: whose limits hold.
+        frames: ``(N, n)`` joint angles [rad] of one clip in time order, or ``(B, N, n)`` for clips of one length.
+        fps: frames per second.
+
+    Returns:
+        As many joint angles [rad]; a clip does not depend on the others.
+    """
+    given = np.asarray(frames, dtype=np.float64)
+    q = robot.clamp(robot.check(given.reshape(-1, given.shape[-1]))).reshape(given.shape)
+    if (np.abs(np.diff(q, axis=-2)) <= _step(robot, fps) + _SLACK).all():
         return q
-    limiter = SpeedLimiter(robot, fps)
-    return np.stack([limiter(frame) for frame in q])
+    clips = q.reshape(-1, *q.shape[-2:])
+    for k in range(1, clips.shape[1]):
+        clips[:, k] = step_towards(robot, clips[:, k - 1], clips[:, k], fps)
+    return q
 
 
 def speed_violations(robot: Robot, frames: ArrayLike, fps: float) -> NDArray[np.bool_]:
@@ -78,3 +91,14 @@ def speed_violations(robot: Robot, frames: ArrayLike, fps: float) -> NDArray[np.
     q = robot.check(frames)
     result: NDArray[np.bool_] = np.abs(np.diff(q, axis=0)) * float(fps) > robot.speed * (1.0 + 1e-9)
     return result
+
+
+def _step(robot: Robot, fps: float) -> FloatArray:
+    """How far each joint gets in one frame [rad].
+
+    Raises:
+        OptionError: ``fps`` is not positive.
+    """
+    if not (np.isfinite(fps) and fps > 0):
+        raise OptionError(f"fps must be positive, got {fps}")
+    return robot.speed / float(fps)

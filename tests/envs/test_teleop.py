@@ -176,6 +176,42 @@ def test_the_observation_is_what_the_layout_says(cheap):
     np.testing.assert_allclose(observation[layout["operator"]], frame, atol=1e-6)
 
 
+@pytest.mark.parametrize("disturbances", [None, "teleop:full:harsh"])
+def test_base_commands_and_mapped_references_obey_the_speed_limits(hasty, disturbances):
+    env = make(hasty, reference="mapped", preview=2, physics="servo", disturbances=disturbances)
+    repertoire, most = env._fleet.repertoire, env.robot.speed * env.dt + 1e-9
+    for number, clip in enumerate(repertoire.clips):
+        observation, info = env.reset(seed=number, options={"motion": number})
+        base, references, done = [info["base"]], [info["reference"]], False
+        while not done:
+            ahead = observation[env.layout["base_error"]].reshape(3, 10) + observation[env.layout["q"]]
+            assert (np.abs(np.diff(ahead, axis=0)) <= most + 1e-6).all()
+            observation, _, _, done, info = env.step(np.zeros(10))
+            base.append(info["base"])
+            references.append(info["reference"])
+            if disturbances is None:
+                np.testing.assert_allclose(ahead[1], info["base"], atol=1e-6)
+        assert (np.abs(np.diff(base, axis=0)) <= most).all()
+        assert (np.abs(np.diff(references, axis=0)) <= most).all()
+        jumps = np.abs(np.diff(repertoire.mapped_rows(0)[clip.rows], axis=0))
+        assert (jumps > most).any(), "nothing was too fast: the test shows nothing"
+        assert (base[0] == repertoire.mapped_rows(0)[clip.first]).all() == (disturbances is None)
+
+
+def test_frames_that_motors_can_follow_are_left_as_the_mapping_has_them(cheap):
+    env = make(cheap, reference="mapped", physics="servo")
+    repertoire, most = env._fleet.repertoire, env.robot.speed * env.dt
+    for number, clip in enumerate(repertoire.clips):
+        mapped = repertoire.mapped_rows(0)[clip.rows]
+        bases = [env.reset(options={"motion": number})[1]["base"]]
+        bases += [env.step(np.zeros(10))[4]["base"] for _ in range(clip.length)]
+        same = (bases == mapped).all(axis=1)
+        fast = (np.abs(np.diff(mapped, axis=0)) > most).any(axis=1)
+        first = int(np.argmax(fast)) if fast.any() else clip.length
+        assert same[: first + 1].all()
+        assert same.mean() > 0.5
+
+
 def test_errors_and_reward_are_those_of_the_robot_against_its_reference(cheap):
     env = make(cheap)
     env.reset(seed=0)
