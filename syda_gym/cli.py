@@ -61,11 +61,11 @@ def print_json(value: Any) -> None:
     typer.echo(json.dumps(value, indent=1))
 
 
-def print_table(table: Any, most_columns: int | None = None) -> None:
-    """Prints a ``syda_gym.evaluation.report.Table`` on the terminal, only its first columns if so asked."""
-    from syda_gym.evaluation.terminal import rich_table
+def print_table(table: Any) -> None:
+    """Prints a ``syda_gym.evaluation.report.Table`` on the terminal."""
+    from syda_gym.evaluation import terminal
 
-    console().print(rich_table(table, most_columns=most_columns))
+    terminal.print_table(table, console())
 
 
 @contextmanager
@@ -134,7 +134,7 @@ def demo(
     for operator, route in result.chosen.items():
         ties = "".join(f"; {' > '.join(other.bodies)} lies within sampling noise" for other in route.ties)
         console().print(f"Route chosen for [bold]{operator}[/]: [bold]{' > '.join(route.bodies)}[/]{ties}")
-    print_table(chain_table(result), 8)
+    print_table(chain_table(result))
     if result.residual:
         print_table(result.residual.table())
     console().print(f"\nReport: [bold]{result.report}[/]  (open it in a browser)")

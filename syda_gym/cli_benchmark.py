@@ -45,7 +45,7 @@ def benchmark(
         )
     page = write_benchmark_report(results, motions, out)
     if results.select(kind="episodes").rows:
-        _print_table(summary_table(results.select(kind="episodes")), 9)
+        _print_table(summary_table(results.select(kind="episodes")))
     for failure in results.about["failures"]:
         last = failure["trace"].strip().splitlines()[-1]
         _console(stderr=True).print(f"failed: {failure['cell']}: {last}", style="red", markup=False, soft_wrap=True)
@@ -158,10 +158,10 @@ def _console(*, stderr: bool = False) -> Console:
     return Console(stderr=stderr)
 
 
-def _print_table(table: Any, most_columns: int | None = None) -> None:
-    from syda_gym.evaluation.terminal import rich_table
+def _print_table(table: Any) -> None:
+    from syda_gym.evaluation.terminal import print_table
 
-    _console().print(rich_table(table, most_columns=most_columns))
+    print_table(table, _console())
 
 
 def _command() -> str:

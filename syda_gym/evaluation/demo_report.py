@@ -109,19 +109,18 @@ def transferability_table(result: DemoResult) -> Table:
     for (a, b), link in result.links.items():
         paper = result.paper_links.get((a, b))
         rows.append(
-            [f"{a}>{b}", 1 - link.S, 1 - link.D, link.L, link.coverage, Estimate(
-                link.T, link.T - link.tolerance, link.T + link.tolerance
-            ), paper.T if paper else None, _TABLE_2.get((a, b))]
+            [f"{a}>{b}", Estimate(link.T, link.T - link.tolerance, link.T + link.tolerance), paper.T if paper else None,
+             _TABLE_2.get((a, b)), 1 - link.S, 1 - link.D, link.L, link.coverage]
         )  # fmt: skip
     columns = [
         Column("Link"),
+        Column("T", tip="transferability, general definition, with its tie band (Eq. 10)"),
+        Column("T, the paper's", digits=4, tip="by the paper's own definition"),
+        Column("Table 2", digits=4, tip="as the paper printed it"),
         Column("1-S", tip="share of cells where the follower lacks manipulability (Eq. 8)"),
         Column("1-D", tip="similarity there (Eq. 9)"),
         Column("L", tip="length ratio (Eq. 7)"),
         Column("Coverage", tip="share of the leader's cells that the follower reaches at all"),
-        Column("T", tip="transferability, general definition, with its tie band (Eq. 10)"),
-        Column("T, paper's definition", digits=4),
-        Column("Table 2", digits=4, tip="as the paper printed it"),
     ]
     chosen = {edge for route in _chosen_routes(result) for edge in zip(route[:-1], route[1:], strict=True)}
     strong = [index for index, edge in enumerate(result.links) if edge in chosen]

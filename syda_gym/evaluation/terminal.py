@@ -1,39 +1,92 @@
-"""Report tables on a terminal."""
+"""Report tables on a terminal, as many columns as it is wide."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from syda_gym.evaluation.report.model import Cell, Column, Table
 from syda_gym.evaluation.statistics import Estimate
 
-__all__ = ["rich_table"]
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["print_table", "rich_table"]
+
+_GAP, _EDGES = 3, 2  # characters between two columns, and beside the first and the last
 
 
-def rich_table(table: Table, *, most_rows: int = 60, most_columns: int | None = None) -> Any:
-    """A report's table as a ``rich.table.Table``.
+def print_table(table: Table, console: Console) -> None:
+    """Prints a table, no wider than the console; what does not fit is named below it.
 
     Args:
         table: what to show.
-        most_rows: further rows are left to the report.
-        most_columns: further columns are left to the report.
+        console: where.
     """
+    console.print(rich_table(table, console.width))
+
+
+def rich_table(table: Table, width: int, *, most_rows: int = 60) -> Any:
+    """A report's table as something that ``rich`` prints: a table that fits the terminal and the words below it.
+
+    A cell is never cut: columns are shown from the left as long as they fit, the others are named below.
+
+    Args:
+        table: what to show.
+        width: of the terminal [characters].
+        most_rows: further rows are left to the report.
+    """
+    from rich import box
+    from rich.console import Group
     from rich.table import Table as RichTable
     from rich.text import Text
 
-    note = table.note
-    if len(table.rows) > most_rows:
-        note = f"{len(table.rows) - most_rows} further rows are in the report. {note}"
-    shown = RichTable(title=table.title, caption=note or None, title_justify="left", caption_justify="left")
-    for index, column in enumerate(table.columns[:most_columns]):
+    rows = table.rows[:most_rows]
+    words = [[_words(cell, column) for cell, column in zip(row, table.columns, strict=True)] for row in rows]
+    titles = [f"{column.title} [{column.unit}]" if column.unit else column.title for column in table.columns]
+    widths = [_width(title, [row[i] for row in words]) for i, title in enumerate(titles)]
+    count = _fitting(widths, width)
+    shown = RichTable(title=Text(table.title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    for index, title in enumerate(titles[:count]):
         numeric = any(not isinstance(row[index], str | bool | None) for row in table.rows)
-        unit = f" [{column.unit}]" if column.unit else ""
-        shown.add_column(Text(f"{column.title}{unit}"), justify="right" if numeric else "left")
-    for index, row in enumerate(table.rows[:most_rows]):
-        cells = [Text(_words(cell, column)) for cell, column in zip(row, table.columns, strict=True)]
-        shown.add_row(*cells[:most_columns], style="bold" if index in table.strong else None)
-    return shown
+        side: Any = "right" if numeric else "left"
+        shown.add_column(Text(title), justify=side, vertical="bottom", min_width=widths[index])
+    for index, row in enumerate(words):
+        shown.add_row(*(_stiff(cell) for cell in row[:count]), style="bold" if index in table.strong else None)
+    return Group(shown, *_below(table, titles[count:], len(rows)))
+
+
+def _fitting(widths: list[int], width: int) -> int:
+    """How many columns fit; the first is always shown."""
+    used = _EDGES - _GAP
+    for count, one in enumerate(widths):
+        used += one + _GAP
+        if used > width and count:
+            return count
+    return len(widths)
+
+
+def _width(title: str, cells: list[str]) -> int:
+    """A heading may break between words, a cell may not."""
+    return max(len(word) for word in [*title.split(), *cells, ""])
+
+
+def _stiff(cell: str) -> Any:
+    from rich.text import Text
+
+    return Text(cell, no_wrap=True, overflow="fold")
+
+
+def _below(table: Table, hidden: list[str], rows: int) -> list[Any]:
+    from rich.text import Text
+
+    parts = []
+    if len(table.rows) > rows:
+        parts.append(f"{len(table.rows) - rows} further rows are in the report.")
+    if hidden:
+        parts.append(f"A wider terminal also shows: {', '.join(hidden)}.")
+    words = " ".join([*parts, table.note]).strip()
+    return [Text(f"{words}\n", style="dim")] if words else []
 
 
 def _words(cell: Cell, column: Column) -> str:
