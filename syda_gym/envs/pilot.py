@@ -27,7 +27,6 @@ FIT_FPS = 10.0
 """Mappings are fitted on frames at most this dense; neighbours at 30 Hz are near-duplicates."""
 
 _MAX_HOPS = 2
-_SAMPLES = 2**16  # enough to rank routes; the function syda_gym.transferability takes 2**20
 _PAPER_BODIES = ("adult", "kid", "pepper")
 
 
@@ -176,20 +175,17 @@ class Pilot:
 
         ends = [self.motions.bodies.get(name, name) for name in (self.operator, self.robot)]
         pairs = [(self._body(a), self._body(b)) for a, b in self.fitted]
-        return ranked_routes(
-            ends[0], ends[1], pairs, max_hops=_MAX_HOPS, directed=True, samples=_SAMPLES
-        )  # fmt: skip
+        return ranked_routes(ends[0], ends[1], pairs, max_hops=_MAX_HOPS, directed=True)
 
     def _planned(self, bodies: tuple[str, ...]) -> PlannedRoute:
-        from syda_gym.transferability.metric import transferability
+        from syda_gym.transferability.routing import BodyGraph
 
-        product = 1.0
-        for a, b in zip(bodies[:-1], bodies[1:], strict=True):
-            try:
-                product *= transferability(self._body(a), self._body(b), samples=_SAMPLES).T
-            except SydaError:
-                return PlannedRoute(bodies, float(np.nan))
-        return PlannedRoute(bodies, float(product))
+        known = [self._body(name) for name in bodies]
+        try:
+            graph = BodyGraph((), zip(known[:-1], known[1:], strict=True), directed=True)
+            return PlannedRoute(bodies, float(graph.route(bodies).T))
+        except SydaError:
+            return PlannedRoute(bodies, float(np.nan))
 
     def _body(self, name: str) -> Embodiment:
         return self.motions.bodies[name] if name in self.motions.bodies else catalog.get(name)

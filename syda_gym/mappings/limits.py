@@ -80,7 +80,7 @@ def limit_speed(robot: Robot, frames: ArrayLike, fps: float) -> FloatArray:
     q = robot.clamp(robot.check(given.reshape(-1, given.shape[-1]))).reshape(given.shape)
     if (np.abs(np.diff(q, axis=-2)) <= _step(robot, fps) + _SLACK).all():
         return q
-    clips = q.reshape(-1, *q.shape[-2:])
+    clips: FloatArray = q.reshape(-1, *q.shape[-2:])
     for k in range(1, clips.shape[1]):
         clips[:, k] = step_towards(robot, clips[:, k - 1], clips[:, k], fps)
     return q

@@ -15,10 +15,11 @@ from syda_gym.errors import OptionError, nearest_name
 from syda_gym.transferability import general, paper
 from syda_gym.transferability.arms import canonical_arms
 from syda_gym.transferability.general import Sampling
+from syda_gym.transferability.shipped import shipped_comparison
 from syda_gym.transferability.store import MEMORY, WorkspaceStore
 from syda_gym.transferability.workspace import arm_length, chain_fingerprint, generic_rank
 
-__all__ = ["DEFINITIONS", "ArmPair", "Transferability", "pair_arms", "transferability"]
+__all__ = ["DEFINITIONS", "ArmPair", "Transferability", "compare_arms", "pair_arms", "transferability"]
 
 Definition = Literal["general", "paper"]
 DEFINITIONS: tuple[Definition, ...] = ("general", "paper")
@@ -110,7 +111,7 @@ def transferability(
         cell: edge of a cell in arm lengths (``general`` only; the paper's is 0.1).
         seed: seed of the samples; the same seed gives the same bits.
         repeats: independent samplings, at least 2 (``general`` only).
-        store: where sampled workspaces are kept.
+        store: where sampled workspaces are kept; another than the default one samples the bundled bodies as well.
 
     Returns:
         All terms, with noise floor and spread.
@@ -179,7 +180,7 @@ def _paper(a: Embodiment, b: Embodiment, alpha: float | None, store: WorkspaceSt
 
 def _general(a: Embodiment, b: Embodiment, alpha: float, sampling: Sampling, store: WorkspaceStore) -> Transferability:
     pairs, notes = pair_arms(a, b)
-    measured = [_compare_arms(pair, sampling, store) for pair in pairs]
+    measured = [compare_arms(pair, sampling, store) for pair in pairs]
     # (arms, repeats, [S, C, coverage, C of A resampled]) -> mean over arms, per repeat
     repeats = np.array(measured).mean(axis=0)
     S, C, coverage, self_capability = (float(value) for value in repeats.mean(axis=0))
@@ -202,8 +203,16 @@ def _general(a: Embodiment, b: Embodiment, alpha: float, sampling: Sampling, sto
     )
 
 
-def _compare_arms(pair: ArmPair, sampling: Sampling, store: WorkspaceStore) -> list[tuple[float, ...]]:
-    """S, C, coverage and C(A, A resampled) of one pair of arms, per repeat."""
+def compare_arms(pair: ArmPair, sampling: Sampling, store: WorkspaceStore) -> list[tuple[float, ...]]:
+    """S, C, coverage and C(A, A resampled) of one pair of arms, per repeat.
+
+    Args:
+        pair: the arms.
+        sampling: how they are sampled.
+        store: where workspaces are kept; with the shared one, comparisons that come with the package are not repeated.
+    """
+    if store is MEMORY and (known := shipped_comparison(pair.source, pair.target, sampling)) is not None:
+        return known
     rank = min(generic_rank(pair.source), generic_rank(pair.target))
     a = [general.general_workspace(pair.source, sampling, i, rank, store) for i in range(sampling.repeats)]
     b = [general.general_workspace(pair.target, sampling, i, rank, store) for i in range(sampling.repeats)]

@@ -266,6 +266,7 @@ def test_routes_are_chosen_and_drawn_by_transferability(cheap):
     assert seen == {"adult>pepper", "adult>kid>pepper"}
     trusts = [route.transferability for route in env._fleet.repertoire.routes]
     assert trusts == sorted(trusts, reverse=True)
+    assert trusts[0] == syda_gym.best_route("adult", "pepper", fitted=env._fleet.repertoire.pilot.fitted).T
     assert make(cheap, route="auto").routes[0] == env.routes[0]
 
 
