@@ -183,7 +183,7 @@ class Calibrator:
         self._next_try = -np.inf
 
     def add(self, now: float, frame: FloatArray) -> Calibration | None:
-        """Takes one frame ``(F,)`` that arrived at ``now`` [s]; returns the calibration once there is one."""
+        """Takes one frame ``(F,)`` of the stream's time ``now`` [s]; returns the calibration once there is one."""
         if not isinstance(self.body, HumanSkeleton) or self.seconds == 0.0:
             return Calibration(self.body, axes=self.axes)
         if self._window and now - self._window[-1][0] > 0.5 * self.seconds:

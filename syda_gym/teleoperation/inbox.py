@@ -36,7 +36,10 @@ class Inbox:
 
     def __init__(self) -> None:
         self.dropped: Counter[str] = Counter()
-        self._condition = threading.Condition()
+        self._lock = threading.Lock()
+        self._condition = threading.Condition(self._lock)
+        self._room = threading.Condition(self._lock)
+        self._listening = False
         self._packet: Packet | None = None
         self._arrived = 0.0
         self._controls: list[str] = []
@@ -64,13 +67,25 @@ class Inbox:
         with self._condition:
             self.dropped[reason] += 1
 
+    def wait_for_room(self) -> bool:
+        """Waits until somebody listens and the last frame was taken; false once the inbox is closed.
+
+        For sources that can wait, as a recording can and a camera cannot.
+        """
+        with self._lock:
+            self._room.wait_for(lambda: self._closed or (self._listening and self._packet is None))
+            return not self._closed
+
     def take(self, timeout: float) -> Received:
         """Waits up to ``timeout`` seconds for something and takes it; empty-handed after that."""
         with self._condition:
+            self._listening = True
+            self._room.notify()
             if self._packet is None and not self._controls and not self._closed and timeout > 0.0:
                 self._condition.wait(timeout)
             packet, controls = self._packet, tuple(self._controls)
             self._packet = None
+            self._room.notify()
             self._controls.clear()
             return Received(packet, self._arrived, controls)
 
@@ -79,6 +94,7 @@ class Inbox:
         with self._condition:
             self._closed = True
             self._condition.notify_all()
+            self._room.notify_all()
 
     @property
     def closed(self) -> bool:

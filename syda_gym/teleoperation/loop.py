@@ -10,6 +10,7 @@ from syda_gym.mappings.mapping import Mapping
 from syda_gym.teleoperation.calibration import Calibration, Calibrator
 from syda_gym.teleoperation.confidence import ConfidencePolicy
 from syda_gym.teleoperation.filters import OneEuroFilter
+from syda_gym.teleoperation.frame_clock import FrameClock
 from syda_gym.teleoperation.guarded import GuardedMapping
 from syda_gym.teleoperation.homing import WayHome
 from syda_gym.teleoperation.limiter import CommandLimiter
@@ -73,7 +74,8 @@ class TeleoperationLoop:
         self._command = self._limiter.start(self.robot.rest if start is None else self.robot.check(start)[0])
         self._target = self._command.copy()
         self._last: float | None = None
-        self._frame_times: tuple[float, float | None] | None = None
+        self._standing = FrameClock()  # of the frames that the calibration takes
+        self._targets = FrameClock()  # of those that moved the target
         self._trust = 0.0
         self._following_since = 0.0
         self._home = WayHome(self.robot.rest, self.settings.ease * self._limiter.speed, self._collision)
@@ -153,7 +155,7 @@ class TeleoperationLoop:
             reasons.append("frame: wrong shape or not finite")
             return float("nan"), False
         if self.calibration is None:
-            self._calibrate(tick.now, frame, reasons)
+            self._calibrate(tick, frame, reasons)
             if self.calibration is None:
                 return float("nan"), False
         odd = self.calibration.implausible(frame)
@@ -179,8 +181,9 @@ class TeleoperationLoop:
         self._aim(mapped.angles, tick)
         return mapped.bound, True
 
-    def _calibrate(self, now: float, frame: FloatArray, reasons: list[str]) -> None:
-        self.calibration = self._calibrator.add(now, frame)
+    def _calibrate(self, tick: Tick, frame: FloatArray, reasons: list[str]) -> None:
+        self._standing.advance(tick.now, tick.sent)
+        self.calibration = self._calibrator.add(self._standing.time, frame)
         if self.calibration is None:
             reasons.append("calibrating")
         else:
@@ -190,7 +193,7 @@ class TeleoperationLoop:
 
     def _aim(self, angles: FloatArray, tick: Tick) -> None:
         """Filters the mapped angles into the target and feeds the watchdog."""
-        passed = self._since_last_frame(tick)
+        passed = self._targets.advance(tick.now, tick.sent)
         fresh = self._watchdog.verdict(tick.now) is not Watch.FOLLOW
         self._watchdog.feed(tick.now)
         if self._filter is None:
@@ -199,15 +202,6 @@ class TeleoperationLoop:
         if fresh or not 0.0 <= passed < 1.0:  # the filter's past is not the operator's any more
             self._filter.reset(angles)
         self._target = self._filter(angles, passed)
-
-    def _since_last_frame(self, tick: Tick) -> float:
-        """By the sender's clock, which knows no network jitter; by ours if the sender's stands still."""
-        before, self._frame_times = self._frame_times, (tick.now, tick.sent)
-        if before is None:
-            return 0.0
-        if tick.sent is not None and before[1] is not None and tick.sent > before[1]:
-            return tick.sent - before[1]
-        return tick.now - before[0]
 
     def _choose(self, now: float, reasons: list[str]) -> float:
         """Moves the state on; returns the speed factor, 0 to stand still."""

@@ -18,6 +18,7 @@ from syda_gym.motions.loading import load_motions
 from syda_gym.motions.session import Session
 from syda_gym.teleoperation.calibration import Calibration, Calibrator
 from syda_gym.teleoperation.choosing import geometric_mapping
+from syda_gym.teleoperation.frame_clock import FrameClock
 from syda_gym.teleoperation.limiter import CommandLimiter
 from syda_gym.teleoperation.sinks import Sink
 from syda_gym.teleoperation.sources import Source
@@ -142,11 +143,13 @@ class _Stage:
 
     def calibrate(self) -> None:
         calibrator = Calibrator(self.operator, self.options.calibration, self.options.axes)
+        stream = FrameClock()
         end = self.source.clock() + self.options.patience
         while self.calibration is None:
             received = self.source.inbox.take(0.1)
             if received.packet is not None and received.packet.frame is not None:
-                self.calibration = calibrator.add(received.arrived, received.packet.frame)
+                stream.advance(received.arrived, received.packet.sent)
+                self.calibration = calibrator.add(stream.time, received.packet.frame)
             elif self.source.clock() > end or self.source.inbox.closed:
                 raise TeleoperationError(
                     f"nobody stood still in front of the source: {calibrator.message or 'no frames came'}"

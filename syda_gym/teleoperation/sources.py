@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ipaddress
+import math
 import socket
 import threading
 import time
@@ -77,7 +78,10 @@ class Source(ABC):
 
 
 class ReplaySource(Source):
-    """Plays clips at their own speed.
+    """Plays clips at their own speed, to somebody who listens.
+
+    It begins when the loop first takes a frame, and waits for a loop that is late, on a busy machine for example, so
+    that no frame of a recording is ever lost.
 
     Args:
         clips: of one body, played one after the other.
@@ -111,22 +115,29 @@ class ReplaySource(Source):
 
     @property
     def seconds(self) -> float:
-        """Duration of one pass [s]."""
+        """Duration of one pass [s], if the loop keeps up."""
         return (self.stand + sum(clip.seconds for clip in self.clips)) / self.speed
 
     def _run(self) -> None:
-        begun, sequence, due = self.clock(), 0, 0.0
+        sequence, due, begun = 0, 0.0, -math.inf
         while not self._ending.is_set():
             for frame, period in self._frames():
-                wait = begun + due - self.clock()
-                if wait > 0.0 and self._ending.wait(wait):
-                    break
+                if not self.inbox.wait_for_room():
+                    return
+                now = self.clock()
+                if now - begun - due > period / self.speed:  # the loop was late: what is left to play moves on with it
+                    begun = now - due
+                elif self._ending.wait(max(0.0, begun + due - now)):
+                    return
                 self.inbox.put(Packet(sequence, due, frame), self.clock())
                 sequence += 1
                 due += period / self.speed
             if not self.repeat:
                 break
         self._ending.wait(max(0.0, begun + due - self.clock()))
+        self.inbox.close()
+
+    def _shut(self) -> None:
         self.inbox.close()
 
     def _frames(self) -> Any:
@@ -136,8 +147,6 @@ class ReplaySource(Source):
                 yield self.body.standing(), 1.0 / first.fps
         for clip in self.clips:
             for frame in clip.frames:
-                if self._ending.is_set():
-                    return
                 yield frame, 1.0 / clip.fps
 
 

@@ -14,6 +14,7 @@ from syda_gym.errors import MotionError, TeleoperationError
 from syda_gym.mappings.fitting import fit
 from syda_gym.motions import read_dataset, validate_dataset, write_dataset
 from syda_gym.motions.clip import MotionClip
+from syda_gym.teleoperation.inbox import Inbox, Received
 from syda_gym.teleoperation.packets import Packet
 from syda_gym.teleoperation.recording import RecordingOptions, record_session
 from syda_gym.teleoperation.sinks import MemorySink
@@ -22,17 +23,37 @@ from syda_gym.teleoperation.sources import Source
 QUICK = RecordingOptions(calibration=0.4, countdown=0.2, tail=0.4, max_lag=0.5, patience=3.0, ease=1.0)
 
 
+class SimulatedInbox(Inbox):
+    """Its waiting moves a simulated clock on, so that a session takes no time and never a frame is late."""
+
+    def __init__(self, source: Mimic) -> None:
+        super().__init__()
+        self.source = source
+
+    def take(self, timeout: float) -> Received:
+        source = self.source
+        if source.due > source.now + timeout:
+            source.now += timeout
+            return Received(None, 0.0, ())
+        source.now = source.due
+        source.due += 0.03
+        return Received(Packet(source.number, source.now, source.frame()), source.now, ())
+
+
 class Mimic(Source):
     """Somebody 1.3 times the adult's size who stands for a second and then does what the robot did 0.15 s ago."""
 
     def __init__(self, body: HumanSkeleton, robot: Robot, sink: MemorySink, lag: float = 0.15) -> None:
-        super().__init__(body)
+        super().__init__(body, clock=lambda: self.now)
         self.robot, self.sink, self.lag = robot, sink, lag
+        self.now, self.due, self.number = 0.0, 0.0, 0
+        self.inbox = SimulatedInbox(self)
 
-    def pose(self) -> FloatArray:
+    def frame(self) -> FloatArray:
         assert isinstance(self.body, HumanSkeleton)
-        seen = [d for d in list(self.sink.decisions) if d.now <= self.clock() - self.lag]
-        if not seen or self.clock() - self.begun < 0.7:
+        self.number += 1
+        seen = [d for d in list(self.sink.decisions) if d.now <= self.now - self.lag]
+        if not seen or self.now < 0.7:
             return 1.3 * self.body.standing()
         limbs = np.diff(self.robot.arm_points(seen[-1].command), axis=2)[0]
         limbs *= self.body.arm_lengths[..., None] / np.linalg.norm(limbs, axis=-1, keepdims=True)
@@ -42,10 +63,7 @@ class Mimic(Source):
         return 1.3 * self.body.frames_from_points(points[None])[0]
 
     def _run(self) -> None:
-        self.begun, number = self.clock(), 0
-        while not self._ending.wait(0.03):
-            self.inbox.put(Packet(number, self.clock(), self.pose()), self.clock())
-            number += 1
+        """Frames come when they are asked for."""
 
 
 @pytest.fixture
@@ -87,11 +105,11 @@ def test_a_recorded_session_can_be_fitted(
 
 def test_a_person_who_leaves_and_nobody_at_all(adult: HumanSkeleton, pepper: Robot, prompts: list[MotionClip]) -> None:
     class Leaver(Mimic):
-        def _run(self) -> None:
-            self.begun = self.clock()
-            for number in range(25):
-                self.inbox.put(Packet(number, self.clock(), self.body.standing()), self.clock())  # type: ignore[attr-defined]
-                self._ending.wait(0.03)
+        def frame(self) -> FloatArray:
+            self.number += 1
+            if self.number == 25:
+                self.due = np.inf
+            return self.body.standing()  # type: ignore[attr-defined, no-any-return]
 
     sink = MemorySink()
     with Leaver(adult, pepper, sink) as source, pytest.raises(MotionError, match="no usable take: only"):
@@ -99,6 +117,7 @@ def test_a_person_who_leaves_and_nobody_at_all(adult: HumanSkeleton, pepper: Rob
 
     class Nobody(Mimic):
         def _run(self) -> None:
+            self.due = np.inf
             self.inbox.close()
 
     with Nobody(adult, pepper, sink) as source, pytest.raises(TeleoperationError, match="no frames came"):

@@ -93,7 +93,7 @@ def test_the_simulated_robot_follows_and_is_filmed(pepper: Robot, tmp_path: Path
     with BulletSink(pepper, video=tmp_path / "film.mp4", camera={"width": 160, "height": 120}) as sink:
         assert isinstance(sink, BulletSink)
         assert np.abs(sink.angles() - pepper.rest).max() < 0.02
-        end = time.monotonic() + 10.0
+        end = time.monotonic() + 60.0
         while np.abs(sink.angles() - goal).max() > 0.03:
             sink.send(Decision(0.0, State.FOLLOWING, goal))
             assert time.monotonic() < end
@@ -114,7 +114,7 @@ def test_a_video_that_cannot_be_written_is_told_and_stops_nothing(pepper: Robot,
     (tmp_path / "file").write_text("")
     sink = BulletSink(pepper, video=tmp_path / "file" / "film.mp4", camera={"width": 64, "height": 64})
     with sink:
-        end = time.monotonic() + 10.0
+        end = time.monotonic() + 60.0
         with pytest.raises(TeleoperationError, match="the simulated robot failed"):  # noqa: PT012 - it comes in time
             while time.monotonic() < end:
                 sink.send(Decision(0.0, State.FOLLOWING, pepper.rest))
@@ -176,7 +176,7 @@ def test_keys_become_requests(monkeypatch: pytest.MonkeyPatch) -> None:
             assert reading
             os.write(ours, b"p x")
             got: tuple[str, ...] = ()
-            end = time.monotonic() + 5.0
+            end = time.monotonic() + 60.0
             while len(got) < 2 and time.monotonic() < end:
                 got += inbox.take(0.1).controls
             assert got == ("pause", "stop")
@@ -192,7 +192,7 @@ def test_the_command_line_runs_journals_and_checks(tmp_path: Path) -> None:
 
     journal = tmp_path / "run.jsonl"
     common = ["teleop", "--mapping", "geometric"]
-    live = ["--sink", "none", "--action", "wave_high", "--seconds", "1.5", "--calibration", "0.5"]
+    live = ["--sink", "none", "--action", "wave_high", "--calibration", "0.5"]
     result = CliRunner().invoke(app, [*common, *live, "--journal", str(journal)])
     assert result.exit_code == 0, result.output
     assert "latency median" in result.output
