@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -126,9 +126,20 @@ def with_right_side(shapes: dict[str, list[Shape]]) -> dict[str, list[Shape]]:
     return shapes | {right_of(link): [shape.mirrored() for shape in shapes[link]] for link in left}
 
 
-def fingers(bases: Iterable[Vector], curl: Vector, radius: float) -> list[Shape]:
-    """Half-open fingers, each one straight from its base."""
-    return [shape for base in bases for shape in rod("grey", base, add(base, curl), radius, caps=1)]
+def fingers(knuckles: Vector, size: Vector, curl: float) -> list[Shape]:
+    """Four half-open fingers as one plate with round tips, for a picture's time goes with the number of its shapes.
+
+    Args:
+        knuckles: the middle of the row of knuckles.
+        size: length, width and thickness.
+        curl: how far they point down [rad].
+    """
+    length, width, thickness = size
+    along = (math.cos(curl), 0.0, -math.sin(curl))
+    middle, tip = (add(knuckles, tuple(share * length * value for value in along)) for share in (0.5, 1.0))
+    plate = block("grey", middle, (length, width, thickness), curl)
+    ends = [add(tip, (0.0, side * width / 2, 0.0)) for side in (-1.0, 1.0)]
+    return plate + rod("grey", *ends, thickness / 2)
 
 
 def both_sides(shapes: list[Shape]) -> list[Shape]:
@@ -171,12 +182,6 @@ def pepper_looks() -> dict[str, list[Shape]]:
     ]
     skirt += [(-0.036, -0.200, 0.196), (-0.034, -0.218, 0.210), (-0.034, -0.300, 0.216)]
     wheels = [(0.09, 0.155, -0.264), (0.09, -0.155, -0.264), (-0.17, 0.0, -0.264)]
-    bases = [
-        (0.0781, -0.0268, 0.004),
-        (0.0833, -0.0073, 0.006),
-        (0.0793, 0.0123, 0.004),
-        (0.070, 0.0309, 0.0),
-    ]
     return with_right_side(
         {
             "torso": pill("white", (-0.041, 0, 0.080), 0.056, 0.086)
@@ -194,13 +199,13 @@ def pepper_looks() -> dict[str, list[Shape]]:
             + disc("dark", (0.020, 0, 0.088), (0.10, 0, 0.0600), 0.06, 0.0735, 0.0085)
             + disc("dark", skull, (0.086, 0, 0.163), 0.09, 0.1005, 0.0065),
             "LShoulder": ball("white", ZERO, 0.045) + rod("grey", (0, -0.04, 0), (0, -0.02, 0), 0.043),
-            "LBicep": rod("white", (0.008, 0.009, 0), (0.138, 0.017, 0), 0.0395, caps=2),
+            # Ends that lie inside the next shape need no caps.
+            "LBicep": rod("white", (0.008, 0.009, 0), (0.138, 0.017, 0), 0.0395, caps=1),
             "LElbow": ball("grey", ZERO, 0.0325),
-            "LForeArm": rod("white", (0.026, 0.001, 0), (0.085, 0, 0), 0.0345, caps=2),
-            "l_wrist": rod("white", (-0.060, -0.001, 0), (0.010, -0.002, 0), 0.0325, caps=1)
-            + pill("white", (0.032, -0.002, 0.002), 0.012, 0.027)
-            + pill("white", (0.055, 0.000, 0.003), 0.024, 0.018)
-            + fingers(bases, (0.026, 0.0, -0.038), 0.0088)
+            "LForeArm": rod("white", (0.010, 0.001, 0), (0.092, 0, 0), 0.0345),
+            "l_wrist": rod("white", (-0.062, -0.001, 0), (0.020, -0.002, 0), 0.0325)
+            + pill("white", (0.044, -0.001, 0.002), 0.022, 0.024)
+            + fingers((0.058, 0.0, 0.004), (0.062, 0.072, 0.017), 0.85)
             + rod("grey", (0.046, -0.034, -0.016), (0.066, -0.031, -0.045), 0.009, caps=1),
             "Hip": rod("grey", (0, 0, 0.035), (0, 0, -0.03), 0.050),
             "Pelvis": tapered("white", (0.007, 0.046, -0.008), (0.012, 0.034, -0.185), 0.074)
@@ -217,7 +222,6 @@ def nao_looks() -> dict[str, list[Shape]]:
     eye = round_eye(skull, skull_radius, (0.050, 0.027, 0.058), 0.0150)
     ear = rod("grey", (0, 0.050, 0.055), (0, 0.068, 0.055), 0.025)
     ear += rod("white", (0, 0.050, 0.055), (0, 0.0705, 0.055), 0.016)
-    bases = [(0.072, -0.013, 0.0), (0.074, 0.0, 0.001), (0.072, 0.013, 0.0)]
     return with_right_side(
         {
             "torso": tapered("white", (0.0, 0.044, 0.065), (0.0, 0.012, -0.022), 0.048)
@@ -239,7 +243,7 @@ def nao_looks() -> dict[str, list[Shape]]:
             "LForeArm": rod("white", (0.02, 0.001, 0), (0.045, 0, 0), 0.026, caps=2),
             "l_wrist": rod("white", (0.0, 0, 0), (0.030, 0, 0), 0.025, caps=2)
             + pill("white", (0.055, 0, 0), 0.010, 0.020)
-            + fingers(bases, (0.022, 0.0, -0.022), 0.0070)
+            + fingers((0.066, 0.0, 0.001), (0.036, 0.040, 0.014), 0.79)
             + rod("grey", (0.048, -0.024, -0.006), (0.068, -0.026, -0.026), 0.007, caps=1),
             "LPelvis": ball("grey", ZERO, 0.030),
             "LHip": ball("grey", ZERO, 0.034),

@@ -14,6 +14,8 @@ from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, nearest_name
+from syda_gym.simulation.frustum import Frustum, PictureWindow
+from syda_gym.simulation.landmark_kinematics import LandmarkKinematics
 from syda_gym.simulation.scene import Marker, PosedRobot, PosedSkeleton, floor_below
 
 __all__ = ["GHOST_COLOR", "MARKER_RADIUS", "OPERATOR_AT", "Camera", "CameraView", "Picture", "error_color"]
@@ -27,6 +29,7 @@ _GHOST_GAP = 2e-5  # of depth, so that a ghost that coincides with the robot doe
 OPERATOR_AT = 0.95  # m to the robot's left
 _SKY_TOP, _SKY_BOTTOM = (0.97, 0.98, 1.0), (0.86, 0.89, 0.94)
 MARKER_RADIUS = 0.046
+_GIRTH = 0.15  # m around the origins of links that their shapes are looked for in; grows where it proves too little
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,8 @@ class CameraView:
 class Camera:
     """Takes pictures; it has PyBullet clients of its own, so that looking never changes the physics.
 
-    Whatever does not move is rendered once and kept with its depth; a frame renders the arms alone and is laid over it.
+    Whatever does not move is rendered once and kept with its depth; a frame renders the arms alone, in the part of the
+    picture where they are, and is laid over it.
 
     Args:
         robot: who follows.
@@ -109,6 +113,8 @@ class Camera:
         self.view = view = view or CameraView()
         self._robot, self._operator = robot, operator if view.operator else None
         self._clients: list[int] = []
+        self._girth = _GIRTH
+        self._landmarks = LandmarkKinematics(robot)
         try:
             self._solid = self._connect()
             self._background, self._depth = self._take_background()
@@ -150,17 +156,21 @@ class Camera:
         if self._skeleton is not None and operator is not None:
             self._skeleton.pose(operator)
         self._show_errors(q, errors)
-        image, depth = self._shoot(self._solid)
-        front = depth < self._depth
-        result = self._background.copy()
-        result[front] = image[front]
+        movers = [body for body in (self._puppet, self._skeleton) if body is not None]
+        window, image, depth = self._look(self._solid, np.concatenate([body.points() for body in movers]), self._depth)
+        result, nearest = self._background.copy(), self._depth
+        front = depth < nearest[window.pixels]
+        result[window.pixels][front] = image[front]
         if self._ghost is not None and reference is not None:
+            nearest = nearest.copy()
+            np.minimum(nearest[window.pixels], depth, out=nearest[window.pixels])
             self._ghost.pose(reference)
-            veil, veil_depth = self._shoot(self._ghost_client)
-            front = veil_depth < np.minimum(depth, self._depth) - _GHOST_GAP
+            window, veil, depth = self._look(self._ghost_client, self._ghost.points(), nearest)
+            front = depth < nearest[window.pixels] - _GHOST_GAP
             # Only the pixels of the ghost are blended; the rest of the picture stays as it is.
-            mixed = (1.0 - _GHOST_SHARE) * result[front] + _GHOST_SHARE * veil[front]
-            result[front] = mixed.astype(np.uint8)
+            covered = result[window.pixels]
+            mixed = (1.0 - _GHOST_SHARE) * covered[front] + _GHOST_SHARE * veil[front]
+            covered[front] = mixed.astype(np.uint8)
         return result
 
     def close(self) -> None:
@@ -196,7 +206,8 @@ class Camera:
         puppet.remove()
         floor_below(client, self._floor)
         self._add_operator(client, moving=False)
-        image, depth = self._shoot(client)
+        shot, far = self._shoot(client, self._frustum.whole)
+        image, depth = shot.copy(), far.copy()
         self._bullet.disconnect(client)
         self._clients.remove(client)
         sky = depth >= 1.0
@@ -221,23 +232,31 @@ class Camera:
 
     def _aim(self, puppet: PosedRobot) -> None:
         """Looks at the middle of what stands there."""
-        view, bullet = self.view, self._bullet
+        view = self.view
         side = 0.5 * OPERATOR_AT if self._operator is not None else 0.0
         height = max(self._robot.height, self._operator.height if self._operator is not None else 0.0)
         center = np.array([0.0, side, self._floor + 0.56 * height])  # raised hands need room
         yaw, pitch = np.radians(view.yaw), np.radians(view.pitch)
         away = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
-        eye = center + view.distance * away
-        self._view = bullet.computeViewMatrix(eye.tolist(), center.tolist(), (0.0, 0.0, 1.0))
-        self._projection = bullet.computeProjectionMatrixFOV(view.fov, view.width / view.height, 0.1, 30.0)
+        self._frustum = Frustum(center + view.distance * away, center, view.fov, view.width, view.height)
 
-    def _shoot(self, client: int) -> tuple[Picture, NDArray[np.float32]]:
-        width, height = self.view.width, self.view.height
+    def _look(
+        self, client: int, points: FloatArray, behind: NDArray[np.float32]
+    ) -> tuple[PictureWindow, Picture, NDArray[np.float32]]:
+        """Renders what stands about ``points``: where in the picture, its colours and its depth."""
+        window = self._frustum.around(points, self._girth)
+        image, depth = self._shoot(client, window)
+        if window == self._frustum.whole or not _cut(depth < behind[window.pixels], window, self._frustum.whole):
+            return window, image, depth
+        self._girth *= 1.5  # shapes reach beyond the window: hands that are larger than expected
+        return self._frustum.whole, *self._shoot(client, self._frustum.whole)
+
+    def _shoot(self, client: int, window: PictureWindow) -> tuple[Picture, NDArray[np.float32]]:
         raw = self._bullet.getCameraImage(
-            width,
-            height,
-            self._view,
-            self._projection,
+            window.width,
+            window.height,
+            self._frustum.view,
+            self._frustum.projection(window),
             lightDirection=(1.5, 0.9, 2.2),
             lightAmbientCoeff=0.62,
             lightDiffuseCoeff=0.40,
@@ -247,8 +266,9 @@ class Camera:
             renderer=self._bullet.ER_TINY_RENDERER,
             physicsClientId=client,
         )
-        image = np.reshape(raw[2], (height, width, 4))[:, :, :3].astype(np.uint8)
-        return image, np.reshape(raw[3], (height, width)).astype(np.float32)
+        shape = (window.height, window.width)
+        image = np.asarray(raw[2], dtype=np.uint8).reshape(*shape, 4)[:, :, :3]
+        return image, np.asarray(raw[3], dtype=np.float32).reshape(shape)
 
     def _show_errors(self, q: FloatArray, errors: FloatArray | None) -> None:
         if not self._markers:
@@ -257,7 +277,7 @@ class Camera:
             for marker in self._markers:
                 marker.hide()
             return
-        points = self._robot.landmarks(q)[0]
+        points = self._landmarks(q[:, None]).reshape(-1, 3)
         for marker, point, error in zip(self._markers, points, errors.tolist(), strict=True):
             marker.show(point, error_color(error / self.view.error_scale))
 
@@ -266,3 +286,14 @@ def error_color(share: float) -> tuple[float, float, float, float]:
     """Green at 0, yellow at one half, red at 1 and beyond."""
     s = round(16.0 * min(max(share, 0.0), 1.0)) / 16.0  # in steps, because recolouring is slow
     return (min(1.0, 0.15 + 1.7 * s), min(0.75, 1.6 * (1.0 - s)), 0.12, 1.0)
+
+
+def _cut(shown: NDArray[np.bool_], window: PictureWindow, whole: PictureWindow) -> bool:
+    """Whether what a window shows goes on beyond an edge that is none of the picture's."""
+    edges = (
+        (window.left > 0, shown[:, 0]),
+        (window.top > 0, shown[0]),
+        (window.left + window.width < whole.width, shown[:, -1]),
+        (window.top + window.height < whole.height, shown[-1]),
+    )
+    return any(inner and bool(edge.any()) for inner, edge in edges)

@@ -76,6 +76,13 @@ class PosedRobot:
             self.body, self._arms, [[angle] for angle in q.tolist()], physicsClientId=self._client
         )
 
+    def points(self) -> FloatArray:
+        """Origins of the links that move with the arms, ``(N, 3)`` [m]."""
+        states = self._bullet.getLinkStates(
+            self.body, self.moving, computeForwardKinematics=1, physicsClientId=self._client
+        )
+        return np.array([state[4] for state in states])
+
     def hide(self, links: Sequence[int]) -> None:
         """Makes links invisible."""
         for link in links:
@@ -157,11 +164,16 @@ class PosedSkeleton:
         feet = min(joints[name][2] for name in ("LFoot", "RFoot"))
         hips = 0.5 * (joints["LHip"] + joints["RHip"])
         shift = self._place - np.array([hips[0], hips[1], feet - _JOINT_RADIUS])
+        self._points = np.array([joints[name] + shift for name, _ in self._balls])
         for first, second, body in self._bones:
             a, b = joints[first] + shift, joints[second] + shift
             self._move(body, 0.5 * (a + b), _turn_to(b - a))
         for name, body in self._balls:
             self._move(body, joints[name] + shift, (0.0, 0.0, 0.0, 1.0))
+
+    def points(self) -> FloatArray:
+        """Where its joints are, ``(N, 3)`` [m]."""
+        return self._points
 
     def _move(self, body: int, position: FloatArray, orientation: Sequence[float]) -> None:
         self._bullet.resetBasePositionAndOrientation(body, position.tolist(), orientation, physicsClientId=self._client)
