@@ -137,13 +137,20 @@ def play(
 
 def export(
     bundle: Annotated[str, typer.Argument(help="A bundle or a shipped agent.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="ONNX file to write.")] = Path("agent.onnx"),
+    out: Annotated[Path, typer.Option("--out", "-o", help="ONNX file to write; a card of it as JSON beside.")] = Path(
+        "agent.onnx"
+    ),
+    mapping: Annotated[
+        str, typer.Option(help="A stored mapping; by default the one beside the bundle, or the shipped one.")
+    ] = "",
+    agent_only: Annotated[bool, typer.Option("--agent-only", help="Leave the mapping out.")] = False,
 ) -> None:
-    """Write an agent as one ONNX graph and check that it commands the same."""
+    """Write mapping and agent as one ONNX graph and check that it commands the same."""
     from syda_gym.agents.work import export_bundle
 
-    difference = export_bundle(bundle, out)
-    _say(f"graph: [bold]{out}[/]  largest difference from the agent {difference:.1e} rad")
+    difference = export_bundle(bundle, out, mapping=mapping or None, agent_only=agent_only)
+    _say(f"graph: [bold]{out}[/]  largest difference from the original {difference:.1e} rad")
+    _say(f"card of its inputs and outputs: [bold]{out}.json[/]")
 
 
 def _options(

@@ -22,7 +22,7 @@ from syda_gym.agents.stacks import build_stack, stack_arrays, stack_spec
 from syda_gym.errors import AgentError, StorageError
 from syda_gym.files import atomic_path, fingerprint, read_json, write_json
 
-__all__ = ["FORMAT", "load_agent", "read_card", "save_agent"]
+__all__ = ["FORMAT", "load_agent", "package_versions", "read_card", "save_agent"]
 
 FORMAT = 1
 """Version of the format; others are refused."""
@@ -65,7 +65,7 @@ def save_agent(
         "mapping": dict(mapping or {}),
         "training": dict(training or {}),
         "figures": dict(figures or {}),
-        "versions": _versions(),
+        "versions": package_versions(),
         "weights": _fingerprint(arrays),
     }
     # The weights first, so that a card never points at weights that are not there; the fingerprint tells if only one
@@ -153,7 +153,8 @@ def _fingerprint(arrays: Mapping[str, NDArray[Any]]) -> str:
     return fingerprint(*parts)
 
 
-def _versions() -> dict[str, str]:
+def package_versions() -> dict[str, str]:
+    """Versions of the packages that matter for the numbers, of those that are installed."""
     found = {}
     for package in _PACKAGES:
         try:

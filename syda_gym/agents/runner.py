@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,15 +17,19 @@ from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import AgentError
+from syda_gym.files import asset
+from syda_gym.mappings.limits import SpeedLimiter
 
 if TYPE_CHECKING:
     from syda_gym.mappings.mapping import Mapping as MotionMapping
 
-__all__ = ["Runner", "stored_interface"]
+__all__ = ["Runner", "bundle_path", "check_pairing", "find_mapping", "stored_interface"]
 
 
 class Runner:
     """Drives one robot: operator frame in, joint command out.
+
+    As in the environment, the base command follows the mapping no faster than the joint speed limits allow.
 
     Args:
         agent: who acts.
@@ -35,36 +40,30 @@ class Runner:
     """
 
     def __init__(self, agent: Agent, mapping: MotionMapping) -> None:
-        interface = agent.interface
-        if mapping.target != interface.robot:
-            raise AgentError(
-                f"the mapping maps onto {mapping.target.name!r}, the agent drives {interface.robot.name!r}; "
-                "give a mapping onto the agent's robot"
-            )
-        features = interface.layout["operator"].stop - interface.layout["operator"].start
-        if mapping.source.n_features != features:
-            raise AgentError(
-                f"the mapping reads {mapping.source.n_features} features of {mapping.source.name!r}, the agent was "
-                f"made for {features}; use the operator it was trained with"
-            )
+        check_pairing(agent, mapping)
         self.agent, self.mapping = agent, mapping
-        self._observation = np.zeros((1, interface.size))
+        self._limiter = SpeedLimiter(agent.interface.robot, 1.0 / agent.interface.dt)
+        self._observation = np.zeros((1, agent.interface.size))
 
     @classmethod
-    def load(cls, agent: str | os.PathLike[str], mapping: str | os.PathLike[str]) -> Runner:
+    def load(cls, agent: str | os.PathLike[str], mapping: str | os.PathLike[str] | None = None) -> Runner:
         """From the paths of a bundle and of a stored mapping.
+
+        Args:
+            agent: path of the bundle, or name of a shipped one.
+            mapping: see ``find_mapping``.
 
         Raises:
             StorageError: missing or corrupt files.
-            AgentError: they do not fit together.
+            AgentError: they do not fit together, or no mapping was found.
         """
-        from syda_gym.mappings.storage import load_mapping
-
-        return cls(load_agent(agent, stored_interface(read_card(agent))), load_mapping(mapping))
+        path = bundle_path(agent)
+        return cls(load_agent(path, stored_interface(read_card(path))), find_mapping(path, mapping))
 
     def reset(self) -> None:
         """Begins an episode."""
         self.agent.reset(1)
+        self._limiter.reset()
 
     def step(self, frame: ArrayLike, q: ArrayLike, *, qd: ArrayLike | None = None, age: float = 0.0) -> FloatArray:
         """The next command.
@@ -80,11 +79,70 @@ class Runner:
         """
         layout, row = self.agent.interface.layout, self._observation[0]
         row[layout["operator"]] = frame
-        row[layout["base_error"]] = self.mapping(np.asarray(frame, dtype=np.float64)) - np.asarray(q)
+        row[layout["base_error"]] = self._limiter(self.mapping(np.asarray(frame, dtype=np.float64))) - np.asarray(q)
         row[layout["q"]] = q
         row[layout["qd"]] = 0.0 if qd is None else qd
         row[layout["packet_age"]] = age
         return np.asarray(self.agent.act(self._observation)[0])
+
+
+def bundle_path(agent: str | os.PathLike[str]) -> Path:
+    """The path of a bundle that is given by its path or by the name of a shipped one."""
+    shipped = asset("agents", os.fspath(agent))
+    return shipped if shipped.with_suffix(".json").is_file() else Path(agent)
+
+
+def find_mapping(agent: str | os.PathLike[str], mapping: str | os.PathLike[str] | None = None) -> MotionMapping:
+    """The mapping of a bundle.
+
+    Args:
+        agent: path of the bundle.
+        mapping: path of a stored mapping. By default the one stored beside the bundle as ``mapping.json``, as training
+            does; without one, the shipped mappings along the route in the bundle's card, if method and preset agree.
+
+    Raises:
+        StorageError: missing or corrupt files.
+        AgentError: none was found.
+    """
+    from syda_gym.mappings.storage import load_mapping
+
+    beside = Path(agent).parent / "mapping.json"
+    if mapping is not None or beside.is_file():
+        return load_mapping(beside if mapping is None else mapping)
+    card = read_card(agent)["mapping"]
+    route = list(card.get("route") or [])
+    paths = [asset("mappings", f"{a}-{b}.json") for a, b in zip(route[:-1], route[1:], strict=True)]
+    if paths and all(path.is_file() for path in paths):
+        found = load_mapping(paths[0])
+        for path in paths[1:]:
+            found = found >> load_mapping(path)
+        if (found.method, found.preset) == (card.get("method"), card.get("preset")):
+            return found
+    raise AgentError(
+        f"no mapping is stored beside {os.fspath(agent)!r}, and none is shipped for its route "
+        f"{' > '.join(route) or '(unknown)'} by {card.get('method')!r}, preset {card.get('preset')!r}; "
+        "name the stored one"
+    )
+
+
+def check_pairing(agent: Agent, mapping: MotionMapping) -> None:
+    """Compares what a mapping gives and takes with what an agent was made for.
+
+    Raises:
+        AgentError: another robot, or an operator with other features.
+    """
+    interface = agent.interface
+    if mapping.target != interface.robot:
+        raise AgentError(
+            f"the mapping maps onto {mapping.target.name!r}, the agent drives {interface.robot.name!r}; "
+            "give a mapping onto the agent's robot"
+        )
+    features = interface.layout["operator"].stop - interface.layout["operator"].start
+    if mapping.source.n_features != features:
+        raise AgentError(
+            f"the mapping reads {mapping.source.n_features} features of {mapping.source.name!r}, the agent was "
+            f"made for {features}; use the operator it was trained with"
+        )
 
 
 def stored_interface(card: Mapping[str, Any]) -> Interface:

@@ -23,10 +23,13 @@ from syda_gym.agents.streams import score_streams
 from syda_gym.agents.training import train_residual
 from syda_gym.agents.tuning import Tuned, tune
 from syda_gym.embodiments.catalog import resolve
+from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.envs.options import TeleopOptions
 from syda_gym.envs.teleop import SydaTeleopEnv
 from syda_gym.errors import AgentError, nearest_name
 from syda_gym.files import asset
+from syda_gym.mappings.mapping import Mapping as MotionMapping
+from syda_gym.mappings.storage import save_mapping
 
 __all__ = [
     "TrainingReport",
@@ -107,6 +110,7 @@ def train_agent(
             "base": report.history[report.best][2].as_dict(),
         },
     )
+    save_mapping(ground.repertoire.pilot.mapping(ground.repertoire.routes[0].bodies), folder / "mapping")
     return report
 
 
@@ -263,31 +267,48 @@ def film(
     return episode_figures(env.robot, q, reference, contacts)
 
 
-def export_bundle(bundle: str | os.PathLike[str], path: str | os.PathLike[str]) -> float:
-    """Writes a bundle, or a shipped agent, as an ONNX graph and compares the two on random observations.
+def export_bundle(
+    bundle: str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    *,
+    mapping: str | os.PathLike[str] | None = None,
+    agent_only: bool = False,
+) -> float:
+    """Writes mapping and agent as one ONNX graph with a card beside it, and compares it with the numpy runner.
 
     Args:
         bundle: path of the bundle, or name of a shipped one.
-        path: of the ``.onnx`` file.
+        path: of the ``.onnx`` file; the card is written as ``.onnx.json`` beside it.
+        mapping: path of a stored mapping; by default the one stored beside the bundle (``mapping.json``), or the
+            shipped ones along the bundle's route.
+        agent_only: leave the mapping out; the graph then reads the environment's observation.
 
     Returns:
         Largest difference of commands [rad].
 
     Raises:
         MissingExtraError: onnx or onnxruntime is not installed.
-        AgentError: the stack holds an agent without a graph, or the graph differs by more than a milliradian.
+        AgentError: a part without a graph, no mapping for the bundle's route, or the graph differs from the original by
+            more than a microradian.
     """
-    from syda_gym.agents.export import OnnxRunner, export_onnx, parity
-    from syda_gym.agents.runner import stored_interface
+    from syda_gym.agents.export import agent_parity, card_path, export_onnx, runner_parity
+    from syda_gym.agents.onnx_runners import OnnxAgent, OnnxRunner
+    from syda_gym.agents.runner import Runner, bundle_path, find_mapping, stored_interface
 
-    source = asset("agents", os.fspath(bundle)) if os.fspath(bundle) in shipped_agents() else Path(bundle)
+    source = bundle_path(bundle)
     interface = stored_interface(read_card(source))
     agent = load_agent(source, interface)
-    export_onnx(agent, path)
-    difference = parity(agent, OnnxRunner(path), _plausible(interface))
-    if not difference < 1e-3:
-        Path(path).unlink(missing_ok=True)
-        raise AgentError(f"the graph differs from the agent by {difference:.2g} rad; this is a defect, report it")
+    if agent_only:
+        export_onnx(agent, path)
+        difference = agent_parity(agent, OnnxAgent(path), _plausible(interface))
+    else:
+        found = find_mapping(source, mapping)
+        export_onnx(agent, path, found)
+        difference = runner_parity(Runner(agent, found), OnnxRunner(path), _plausible_frames(found))
+    if not difference < 1e-6:
+        for written in (Path(path), card_path(path)):
+            written.unlink(missing_ok=True)
+        raise AgentError(f"the graph differs from the original by {difference:.2g} rad; this is a defect, report it")
     return difference
 
 
@@ -317,6 +338,15 @@ def _plausible(interface: Interface, steps: int = 50) -> Any:
     observations[..., interface.layout["base_error"]] = rng.normal(0.0, 0.03, q.shape)
     observations[..., interface.layout["packet_age"]] = rng.integers(0, 4, (steps, 2, 1)) * interface.dt
     return observations
+
+
+def _plausible_frames(mapping: MotionMapping) -> Any:
+    """Frames of the operator along a random smooth motion about its standing or rest pose, ``(T, F)``."""
+    body = mapping.source
+    middle = body.standing() if isinstance(body, HumanSkeleton) else body.rest  # type: ignore[attr-defined]
+    rng = np.random.default_rng(0)
+    walk = np.cumsum(rng.normal(0.0, 0.02, (50, body.n_features)), axis=0)
+    return middle + walk
 
 
 def _mapping_card(ground: Ground) -> dict[str, Any]:

@@ -40,6 +40,11 @@ class LimbIK:
         single = [arm.single for arm in self._arms if arm.single is not None]
         self._single = tuple(single) if len(single) == len(self._arms) else ()
 
+    @property
+    def single_arms(self) -> tuple[SingleArmIK, ...]:
+        """The solvers of single frames, one per arm; empty if an arm has no closed form."""
+        return self._single
+
     def solve(self, directions: ArrayLike) -> FloatArray:
         """Joint angles whose limb directions are nearest to the wanted ones.
 

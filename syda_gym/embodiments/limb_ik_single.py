@@ -15,15 +15,15 @@ from syda_gym.embodiments.arm_chain import ArmChain
 from syda_gym.embodiments.coupled import coupled_range
 from syda_gym.embodiments.embodiment import FloatArray
 
-__all__ = ["SingleArmIK"]
+__all__ = ["EXACT", "FLAT", "STEPS", "SingleArmIK"]
 
 Vector = tuple[float, float, float]
 Swept = tuple[list[Vector], list[Vector], list[Vector]]
 Couplings = Sequence[tuple[int, int, FloatArray, FloatArray, FloatArray]]
 
-_EXACT = 1e-7  # m, as in limb_ik
-_STEPS = 60
-_FLAT = 1e-16  # m^4/rad^2; with a squared slope below this no step gains anything
+EXACT = 1e-7  # m, as in limb_ik
+STEPS = 60
+FLAT = 1e-16  # m^4/rad^2; with a squared slope below this no step gains anything
 
 
 class SingleArmIK:
@@ -83,7 +83,7 @@ class SingleArmIK:
             score = error + self._pull(angles)
             if score < least:
                 best, least, miss = angles, score, error
-        return best if miss <= _EXACT else self._refine(best, goal)
+        return best if miss <= EXACT else self._refine(best, goal)
 
     def _solved(self, upper: Vector, fore: Vector) -> list[float] | None:
         """Of the closed-form solutions within the limits the one nearest to rest; most frames need nothing else."""
@@ -122,7 +122,7 @@ class SingleArmIK:
             goal_elbow = _scaled(upper, self.lengths[0])
             goal = (*goal_elbow, *_sum(goal_elbow, _scaled(fore, self.lengths[1])))
             for angles, real in self._candidates(upper, fore):
-                if real and _squared(_residual(_sweep(self._plan, angles)[0], goal)) > _EXACT**2:
+                if real and _squared(_residual(_sweep(self._plan, angles)[0], goal)) > EXACT**2:
                     return False
         return True
 
@@ -181,7 +181,7 @@ class SingleArmIK:
         swept = _sweep(self._plan, angles)
         residual, columns = _residual(swept[0], goal), self._columns(swept)
         cost, damping = _squared(residual), 1e-4
-        for _ in range(_STEPS):
+        for _ in range(STEPS):
             lower, upper = self._limits(angles)
             free, gradient = [], []
             for index, joint in enumerate(self.movers):
@@ -191,7 +191,7 @@ class SingleArmIK:
                 if not (at_lower or at_upper):
                     free.append(index)
                     gradient.append(slope)
-            if sum([slope * slope for slope in gradient]) < _FLAT:
+            if sum([slope * slope for slope in gradient]) < FLAT:
                 break
             step = _damped_step([columns[index] for index in free], gradient, damping)
             promised = -0.5 * sum([g * s for g, s in zip(gradient, step, strict=True)])

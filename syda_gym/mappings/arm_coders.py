@@ -171,6 +171,10 @@ class RobotArmCoder(Coder):
         body: a robot.
         settings: ``sides`` that are coded.
         arrays: ``rest`` (n,) [rad], the angles of arms that are not coded.
+
+    Attributes:
+        extra_columns: columns of the joints that move neither elbow nor wrist, ``(arms, extras)``.
+        extra_signs: their signs in a mirrored arm, ``(arms, extras)``.
     """
 
     kind = "robot_arms"
@@ -186,7 +190,7 @@ class RobotArmCoder(Coder):
         self.rest = _shaped(arrays, "rest", (body.n_features,))
         self._lateral: list[float] = self._signs[:, 1].tolist()
         self._ik = LimbIK(body)
-        self._extra, self._extra_signs = self._extra_columns()
+        self.extra_columns, self.extra_signs = self._extras()
 
     @classmethod
     def fit(cls, body: Robot, frames: FloatArray, sides: Sequence[Side]) -> RobotArmCoder:
@@ -196,7 +200,7 @@ class RobotArmCoder(Coder):
     @property
     def extras(self) -> int:
         """Joints per arm that move neither elbow nor wrist."""
-        return int(self._extra.shape[1])
+        return int(self.extra_columns.shape[1])
 
     @property
     def width(self) -> int:
@@ -207,7 +211,7 @@ class RobotArmCoder(Coder):
         """Codes ``(N, arms, 6 + extras)``."""
         points = self.robot.arm_points(frames)[:, self._arms] * self._signs[:, None]
         limbs = _unit(np.diff(points, axis=2)).reshape(len(points), len(self._arms), 6)
-        return np.concatenate([limbs, frames[:, self._extra] * self._extra_signs], axis=-1)
+        return np.concatenate([limbs, frames[:, self.extra_columns] * self.extra_signs], axis=-1)
 
     def decode(self, codes: FloatArray) -> FloatArray:
         """Joint angles ``(N, n)`` within the limits."""
@@ -224,7 +228,7 @@ class RobotArmCoder(Coder):
         for arm in self._arms:
             part = self.robot.arm_slices[arm]
             frames[:, part] = solved[:, part]
-        frames[:, self._extra] = codes[..., 6:] * self._extra_signs
+        frames[:, self.extra_columns] = codes[..., 6:] * self.extra_signs
         return self.robot.clamp(frames)
 
     def _decode_one(self, codes: FloatArray) -> FloatArray:
@@ -239,7 +243,7 @@ class RobotArmCoder(Coder):
         for arm in self._arms:
             part = self.robot.arm_slices[arm]
             frame[part] = solved[part]
-        frame[self._extra] = codes[:, 6:] * self._extra_signs
+        frame[self.extra_columns] = codes[:, 6:] * self.extra_signs
         return self.robot.clamp(frame)
 
     def arrays(self) -> Arrays:
@@ -250,7 +254,7 @@ class RobotArmCoder(Coder):
         """The coded sides."""
         return {"sides": list(self.sides)}
 
-    def _extra_columns(self) -> tuple[np.ndarray[Any, np.dtype[np.intp]], FloatArray]:
+    def _extras(self) -> tuple[np.ndarray[Any, np.dtype[np.intp]], FloatArray]:
         """Columns of the joints beyond those of the inverse kinematics, per coded arm, and their mirror signs."""
         per_arm = [
             [

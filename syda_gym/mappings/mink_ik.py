@@ -61,7 +61,7 @@ class MinkArmCoder(RobotArmCoder):
         configuration.update(start)
         goals = self._to_world(configuration, goals)
         frames = np.stack([self._solve(configuration, goal) for goal in goals])
-        frames[:, self._extra] = codes[..., 6:] * self._extra_signs
+        frames[:, self.extra_columns] = codes[..., 6:] * self.extra_signs
         return frames
 
     def _goals(self, codes: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
@@ -23,7 +23,7 @@ _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """The nearest pair of shapes of each pose.
+    """The nearest pair of shapes of each pose (or the nearest few, with one more axis behind the first).
 
     Attributes:
         distance: signed distance ``(N,)`` [m]; negative where the shapes overlap.
@@ -33,7 +33,7 @@ class Nearest:
 
     distance: FloatArray
     gradient: FloatArray
-    pair: np.ndarray[tuple[int], np.dtype[np.intp]]
+    pair: NDArray[np.intp]
 
 
 class CapsuleModel:
@@ -74,15 +74,25 @@ class CapsuleModel:
 
     def nearest(self, frames: ArrayLike) -> Nearest:
         """The nearest pair of each pose and how the joints change its distance."""
+        found = self.nearest_pairs(frames, 1)
+        return Nearest(found.distance[:, 0], found.gradient[:, 0], found.pair[:, 0])
+
+    def nearest_pairs(self, frames: ArrayLike, count: int) -> Nearest:
+        """The ``count`` nearest pairs of each pose, the nearest first; all arrays have one more axis ``(N, count)``.
+
+        Args:
+            frames: joint angles ``(N, n)`` [rad].
+            count: pairs per pose, at most ``len(pairs)``.
+        """
         q = self.robot.check(frames)
         starts, ends = self._ends(q)
         capsule, s, t, along = self._capsule_pairs(starts, ends)
         box, u, normal = self._box_pairs(starts, ends)
         distance = np.concatenate([capsule, box], axis=1)
-        pair = np.argmin(distance, axis=1)
-        rows = np.arange(len(q))
+        pair = np.argsort(distance, axis=1, kind="stable")[:, :count]
+        rows = np.repeat(np.arange(len(q))[:, None], pair.shape[1], axis=1)
         jacobians = self._end_jacobians(q)
-        gradient = np.zeros_like(q)
+        gradient = np.zeros((*pair.shape, q.shape[1]))
         first = pair < capsule.shape[1]
         r, p = rows[first], pair[first]
         moved = self._mixed(jacobians, r, self._first[p], s[r, p]) - self._mixed(jacobians, r, self._second[p], t[r, p])

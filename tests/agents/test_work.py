@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 
 from syda_gym.agents.config import ResidualConfig
 from syda_gym.agents.predictor_training import PredictorConfig
+from syda_gym.agents.runner import find_mapping
 from syda_gym.agents.work import compare_agents, export_bundle, find_agent, shipped_agents, train_agent, tune_rivals
 from syda_gym.cli import app
 from syda_gym.errors import AgentError
@@ -39,7 +40,9 @@ def test_a_bundle_is_found_compared_and_exported(trained, tiny_options, tmp_path
     folder, _ = trained
     results = compare_agents({**tiny_options, "physics": "servo"}, [folder / "agent", "lead"], clips=[0])
     assert list(results) == ["base", str(folder / "agent"), "lead"]
-    assert export_bundle(folder / "agent", tmp_path / "agent.onnx") < 1e-4
+    assert find_mapping(folder / "agent").route == ("adult", "pepper")
+    assert export_bundle(folder / "agent", tmp_path / "agent.onnx") < 1e-6  # with the mapping and its kinematics
+    assert (tmp_path / "agent.onnx.json").is_file()
 
 
 def test_a_predictor_trains_by_the_same_function(tiny_options, tmp_path, monkeypatch):
@@ -68,7 +71,7 @@ def test_unknown_agents_and_shipped_ones(ground):
 def test_the_commands_say_what_they_did_and_errors_in_one_line(trained, tmp_path):
     folder, _ = trained
     runner = CliRunner()
-    done = runner.invoke(app, ["export", str(folder / "agent"), "--out", str(tmp_path / "a.onnx")])
+    done = runner.invoke(app, ["export", str(folder / "agent"), "--out", str(tmp_path / "a.onnx"), "--agent-only"])
     assert done.exit_code == 0, done.output
     assert "largest difference" in done.output
     for command in ("train", "evaluate", "play", "export"):

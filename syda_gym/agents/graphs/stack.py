@@ -12,12 +12,12 @@ from torch import Tensor, nn
 
 from syda_gym.agents.agent import Agent, BaseAlone
 from syda_gym.agents.classical import Ema, Kalman, Lead, OneEuro
+from syda_gym.agents.graphs.arithmetic import constant
+from syda_gym.agents.graphs.limits import robot_clamp
 from syda_gym.agents.interface import Interface
 from syda_gym.agents.predictor import AGE_SCALE, GAP_SCALE, STEP_SCALE, Predictor
 from syda_gym.agents.residual import ResidualPolicy
 from syda_gym.agents.tcn import DILATIONS
-from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import AgentError
 
 __all__ = ["AgentGraph"]
@@ -45,7 +45,7 @@ class AgentGraph(nn.Module):
 
     ``command, state = graph(observation, state, fresh)`` with the observation ``(B, size)``, the state ``(B, S)``
     (zeros before the first step, at least one column) and ``fresh`` ``(B, 1)``: 1 in the first step of an episode,
-    where the state is not read. Equals ``Agent.act`` up to the rounding of float32.
+    where the state is not read. All in float64: equals ``Agent.act`` up to rounding.
 
     Args:
         agent: the stack.
@@ -105,43 +105,17 @@ def _layers(agent: Agent) -> list[_Layer]:
 
 
 class _Limits(nn.Module):
-    """``agent.limited``: joint limits, coupled limits and the speed limit."""
+    """``agent.limited``: the speed limit, then joint limits."""
 
     def __init__(self, interface: Interface) -> None:
         super().__init__()
-        robot = interface.robot
-        step = robot.speed * interface.dt / interface.alpha
-        self.step = _constant(np.minimum(step, 1e6))
-        self.lower, self.upper = _constant(robot.lower), _constant(robot.upper)
-        self.couplings = nn.ModuleList(_couplings(robot))
+        self.step = constant(np.minimum(interface.robot.speed * interface.dt / interface.alpha, 1e6))
+        self.clamp = robot_clamp(interface.robot)
 
     def forward(self, command: Tensor, below: Tensor, q: Tensor) -> Tensor:
-        within = torch.minimum(
-            torch.maximum(command, torch.minimum(q - self.step, below)), torch.maximum(q + self.step, below)
-        )
-        clipped = torch.minimum(torch.maximum(within, self.lower), self.upper)
-        result = clipped
-        for coupling in self.couplings:
-            result = coupling(clipped, result)
-        return result
-
-
-class _Coupling(nn.Module):
-    """A joint's limits that depend on another joint, linear between rows; written as a sum of ramps."""
-
-    def __init__(self, joint: int, by: int, at: FloatArray, lower: FloatArray, upper: FloatArray) -> None:
-        super().__init__()
-        self.joint, self.by = joint, by
-        self.ends = (float(at[0]), float(at[-1]))
-        self.at = _constant(at[:-1])
-        self.values = [(float(side[0]), _constant(_bends(at, side))) for side in (lower, upper)]
-
-    def forward(self, governing: Tensor, command: Tensor) -> Tensor:
-        by = governing[:, self.by : self.by + 1].clamp(*self.ends)
-        ramps = torch.relu(by - self.at)
-        low, high = (first + (ramps * bends).sum(dim=1, keepdim=True) for first, bends in self.values)
-        joint = torch.minimum(torch.maximum(command[:, self.joint : self.joint + 1], low), high)
-        return torch.cat([command[:, : self.joint], joint, command[:, self.joint + 1 :]], dim=1)
+        least, most = torch.minimum(q - self.step, below), torch.maximum(q + self.step, below)
+        limited: Tensor = self.clamp(torch.minimum(torch.maximum(command, least), most))
+        return limited
 
 
 class _LeadGraph(_Layer):
@@ -201,7 +175,7 @@ class _KalmanGraph(_Layer):
         vv = _first(parts, torch.ones_like(parts.age), state[:, 2 * n + 2 : 2 * n + 3])
         since = _first(parts, parts.age, state[:, 2 * n + 3 :] + self.dt)
         # Packets are whole control steps apart, so that half a millisecond tells an old one from a new one.
-        new = (1.0 - parts.fresh) * (since - parts.age > 5e-4).to(command.dtype)
+        new = (1.0 - parts.fresh) * (since - parts.age > 5e-4).to(torch.float64)
         step = new * (since - parts.age)
         pp1 = pp + 2.0 * step * pv + step**2 * vv + self.density * step**3 / 3.0
         pv1 = pv + step * vv + self.density * step**2 / 2.0
@@ -227,15 +201,15 @@ class _PredictorGraph(_Layer):
         robot = agent.interface.robot
         self.n, self.channels, self.bound = agent.interface.n, agent.channels, agent.bound
         self.state_size = self.n + 2 * sum(DILATIONS) * self.channels
-        self.centre = _constant((robot.upper + robot.lower) / 2.0)
-        self.spread = _constant((robot.upper - robot.lower) / 2.0)
+        self.centre = constant((robot.upper + robot.lower) / 2.0)
+        self.spread = constant((robot.upper - robot.lower) / 2.0)
         weights = agent.weights
-        self.inlet = (_constant(weights["inlet.weight"].T), _constant(weights["inlet.bias"]))
+        self.inlet = (constant(weights["inlet.weight"].T), constant(weights["inlet.bias"]))
         self.blocks = [
-            ([_constant(tap.T) for tap in weights[f"blocks.{i}.weight"]], _constant(weights[f"blocks.{i}.bias"]))
+            ([constant(tap.T) for tap in weights[f"blocks.{i}.weight"]], constant(weights[f"blocks.{i}.bias"]))
             for i in range(len(DILATIONS))
         ]
-        self.outlet = (_constant(weights["outlet.weight"].T), _constant(weights["outlet.bias"]))
+        self.outlet = (constant(weights["outlet.weight"].T), constant(weights["outlet.bias"]))
 
     def forward(self, command: Tensor, parts: _Parts, state: Tensor) -> tuple[Tensor, Tensor]:
         last = _first(parts, command, state[:, : self.n])
@@ -274,13 +248,13 @@ class _ResidualGraph(_Layer):
         layout = agent.interface.layout
         self.state_size = agent.interface.n
         self.kept = [part for name, part in layout.items() if name != "previous_action"]
-        self.mean, self.std = _constant(agent.mean), _constant(agent.std)
+        self.mean, self.std = constant(agent.mean), constant(agent.std)
         self.scale, self.smoothing = agent.scale, agent.smoothing
         self.activation = torch.tanh if agent.activation == "tanh" else torch.relu
         self.clips = agent.squash == "clip"
         count = len(agent.weights) // 2
         self.dense = [
-            (_constant(agent.weights[f"layers.{i}.weight"].T), _constant(agent.weights[f"layers.{i}.bias"]))
+            (constant(agent.weights[f"layers.{i}.weight"].T), constant(agent.weights[f"layers.{i}.bias"]))
             for i in range(count)
         ]
 
@@ -300,28 +274,3 @@ class _ResidualGraph(_Layer):
 def _first(parts: _Parts, at_first: Tensor, later: Tensor) -> Tensor:
     """``at_first`` in the first step of an episode, ``later`` in the others."""
     return torch.where(parts.fresh > 0.5, at_first, later)
-
-
-def _constant(value: FloatArray | np.ndarray[tuple[int, ...], np.dtype[np.float32]]) -> Tensor:
-    return torch.as_tensor(np.ascontiguousarray(value), dtype=torch.float32)
-
-
-def _couplings(robot: Robot) -> list[_Coupling]:
-    names = robot.joint_names
-    return [
-        _Coupling(
-            names.index(c.joint),
-            names.index(c.by),
-            np.array(c.at),
-            np.array(c.lower),
-            np.array(c.upper),
-        )
-        for c in robot.description.coupled_limits
-        if c.joint in names and c.by in names
-    ]
-
-
-def _bends(at: FloatArray, values: FloatArray) -> FloatArray:
-    """Changes of slope, so that ``values[0] + sum(bends * relu(x - at[:-1]))`` interpolates linearly."""
-    slopes = np.diff(values) / np.diff(at)
-    return np.diff(slopes, prepend=0.0)

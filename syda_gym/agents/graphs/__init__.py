@@ -1,0 +1,1 @@
+"""Graphs: agents and mappings as torch modules, from which ONNX files are made."""
