@@ -85,6 +85,21 @@ def test_the_gradient_is_the_derivative_of_the_clearance(name):
     assert np.quantile(error, 0.9) < 1e-6  # the rest sits where the nearest pair changes
 
 
+def test_the_nearest_few_pairs_are_those_of_the_least_distances_with_their_own_gradients(pepper):
+    frames = poses(pepper.robot, 40, 4)
+    found, step = pepper.nearest_pairs(frames, 3), 1e-6
+    distances = pepper.distances(frames)
+    assert np.allclose(found.distance, np.sort(distances, axis=1)[:, :3])
+    assert np.array_equal(found.gradient[:, 0], pepper.nearest(frames).gradient)
+    numeric = np.empty_like(found.gradient)
+    for joint in range(frames.shape[1]):
+        moved = frames.copy()
+        moved[:, joint] += step
+        change = (pepper.distances(moved) - distances) / step
+        numeric[:, :, joint] = np.take_along_axis(change, found.pair, axis=1)
+    assert np.quantile(np.abs(numeric - found.gradient).max(axis=2), 0.9) < 1e-4
+
+
 def test_rest_is_free_and_the_zero_pose_with_crossed_arms_is_not(pepper):
     robot = pepper.robot
     assert pepper.clearance(robot.rest)[0] > 0.0
