@@ -86,7 +86,7 @@ def read_json(path: str | os.PathLike[str], limit: int = 64 * 2**20) -> Any:
         raise StorageError(f"{source} is larger than {limit} bytes; expected a small JSON file")
     try:
         return json.loads(source.read_text(encoding="utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise StorageError(f"{source} is not valid JSON: {error}; write it again") from error
 
 

@@ -96,11 +96,13 @@ def load_agent(path: str | os.PathLike[str], where: Any) -> Agent:
             f"{card['weights']}); store the agent again"
         )
     interface = where if isinstance(where, Interface) else Interface.of(where)
-    interface.check(card["interface"], f"the agent in {card_path.name}")
     try:
+        interface.check(card["interface"], f"the agent in {card_path.name}")
         return build_stack(interface, card["stack"], arrays)
     except AgentError as error:
         raise AgentError(f"{card_path}: {error}") from error
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
+        raise StorageError(f"{card_path} is damaged: {error!r}; train again or copy the bundle again") from error
 
 
 def read_card(path: str | os.PathLike[str]) -> dict[str, Any]:

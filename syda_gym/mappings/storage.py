@@ -84,7 +84,7 @@ def load_mapping(path: str | os.PathLike[str]) -> Mapping:
             links.append(_rebuild(entry, part, card))
         except StorageError:
             raise
-        except (SydaError, KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        except (SydaError, KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
             raise StorageError(
                 f"{card} and {weights.name} do not fit together: {error!r}; fit and save again"
             ) from error

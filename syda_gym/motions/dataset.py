@@ -162,8 +162,8 @@ def read_index(root: Path) -> dict[str, Any]:
     place = root / INDEX
     try:
         index = read_json(place)
-    except (StorageError, RecursionError) as error:
-        raise MotionError(str(error) or f"{place} is nested too deeply") from error
+    except StorageError as error:
+        raise MotionError(str(error)) from error
     if not isinstance(index, dict) or index.get("format") != DATASET_FORMAT:
         found = index.get("format") if isinstance(index, dict) else type(index).__name__
         raise MotionError(f'{place}: expected "format": {DATASET_FORMAT!r}, got {found!r}')

@@ -14,7 +14,7 @@ from typing import IO, Any
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.errors import TeleoperationError
+from syda_gym.errors import SydaError, TeleoperationError
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.tick import Decision, LoopSettings, State, Tick
@@ -141,7 +141,7 @@ def read_journal(path: str | os.PathLike[str]) -> tuple[dict[str, Any], Iterator
     file = _open(source, "rt")
     try:
         head = json.loads(file.readline(_MAX_LINE))
-    except (ValueError, OSError, EOFError) as error:
+    except (ValueError, OSError, EOFError, RecursionError) as error:
         file.close()
         raise TeleoperationError(f"{source} is not a journal: {error}") from error
     if not isinstance(head, dict) or head.get("format") != FORMAT:
@@ -161,12 +161,21 @@ def replay_journal(path: str | os.PathLike[str], mapping: Mapping) -> ReplayRepo
         TeleoperationError: not a journal, or a mapping of another route or fit.
     """
     head, decisions = read_journal(path)
+    for key, kind in (("route", list), ("mapping", dict), ("settings", dict), ("start", list)):
+        if not isinstance(head.get(key), kind):
+            raise TeleoperationError(
+                f"{path}, line 1: expected {key!r} to be a {kind.__name__}; the journal is damaged"
+            )
     if list(mapping.route) != head["route"] or json.loads(json.dumps(mapping.card.to_json())) != head["mapping"]:
         raise TeleoperationError(
             f"the journal was written with {' > '.join(head['route'])} ({head['mapping'].get('method')}); the mapping "
             f"given is {mapping!r} or another fit of it; give the mapping of that run"
         )
-    loop = TeleoperationLoop(mapping, LoopSettings.from_json(head["settings"]), np.array(head["start"]))
+    try:
+        settings, start = LoopSettings.from_json(head["settings"]), np.array(head["start"], dtype=np.float64)
+        loop = TeleoperationLoop(mapping, settings, start)
+    except (SydaError, TypeError, ValueError) as error:
+        raise TeleoperationError(f"{path}, line 1: no settings of a loop: {error}") from error
     ticks = same = 0
     first: int | None = None
     commands = []
@@ -197,7 +206,7 @@ def _decisions(source: Path, file: IO[str]) -> Iterator[tuple[int, Tick, Decisio
                 if "dropped" in line:
                     continue
                 yield number, _tick(line), _decision(line)
-            except (ValueError, KeyError, TypeError) as error:
+            except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
                 raise TeleoperationError(f"{source}, line {number}: not a decision: {error!r}") from error
 
 

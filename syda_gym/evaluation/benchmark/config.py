@@ -227,7 +227,7 @@ def _check_agent(name: str) -> None:
     from syda_gym.agents.classical import RIVALS
 
     known = [*RIVALS, "residual"]
-    if name in known or Path(name).with_suffix(".safetensors").is_file():
+    if name in known or (Path(name).name and Path(name).with_suffix(".safetensors").is_file()):
         return
     raise OptionError(f"unknown agent {name!r}, and no stored agent of that name; {nearest_name(name, known)}")
 

@@ -15,19 +15,18 @@ from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.errors import MotionError
 from syda_gym.motions.clip import Motions, Take
+from syda_gym.motions.readers.workbook import read_sheets
 
 __all__ = ["DEFAULT_FPS", "read_paper"]
 
 DEFAULT_FPS = 10.0
 """The recordings carry no timestamps; 10 Hz is an assumption that the caller may replace."""
 
-_HEADER = ("TransX", "TransY", "TransZ", "RotX", "RotY", "RotZ", "RotW")
 _HUMAN_SHEETS = ("LShoulder", "LElbow", "LHand", "RShoulder", "RElbow", "RHand")
 _ELBOW_TILT = 0.157079  # rad; Pepper's elbow frame is pitched by -9 degrees before ElbowYaw turns
 # Sheet of each arm joint and the axis (0 x, 1 y, 2 z) about which it turns; the elbow first loses its tilt.
 _PEPPER_SHEETS = (("Shoulder", 1), ("Bicep", 2), ("Elbow", 0), ("ForeArm", 2), ("Hand", 0))
 _FILE_NAME = re.compile(r"(human|pepper)_P(\d\d)A(\d\d)T(\d\d)")
-_MAX_BYTES = 64 * 2**20
 
 
 def read_paper(folder: str | Path, fps: float = DEFAULT_FPS) -> Motions:
@@ -119,14 +118,14 @@ def _parse(path: Path) -> tuple[str, str, str]:
 
 
 def _read_human(path: Path) -> FloatArray:
-    sheets = _sheets(path, _HUMAN_SHEETS)
+    sheets = read_sheets(path, _HUMAN_SHEETS)
     return np.concatenate([sheets[name][:, :3] for name in _HUMAN_SHEETS], axis=1)
 
 
 def _read_pepper(path: Path) -> FloatArray:
     """Joint angles ``(N, 10)`` [rad] from the quaternions of Pepper's local frames (exact, see the module)."""
     names = [side + part for side in "LR" for part, _ in _PEPPER_SHEETS]
-    sheets = _sheets(path, names)
+    sheets = read_sheets(path, names)
     columns = [
         _angle(sheets[side + part][:, 3:], axis, tilt=_ELBOW_TILT if part == "Elbow" else 0.0)
         for side in "LR"
@@ -143,43 +142,3 @@ def _angle(quaternions: FloatArray, axis: int, tilt: float) -> FloatArray:
     angle = 2.0 * np.arctan2(turned[axis], turned[3])
     wrapped: FloatArray = (angle + np.pi) % (2.0 * np.pi) - np.pi
     return wrapped
-
-
-def _sheets(path: Path, names: list[str] | tuple[str, ...]) -> dict[str, FloatArray]:
-    """Reads the named sheets of one workbook as ``(N, 7)`` arrays."""
-    import python_calamine
-
-    if not path.is_file():
-        raise MotionError(f"no workbook {path}; the data set is incomplete")
-    if path.stat().st_size > _MAX_BYTES:
-        raise MotionError(f"{path} is larger than {_MAX_BYTES >> 20} MB; that is no recording of this data set")
-    try:
-        book = python_calamine.CalamineWorkbook.from_path(str(path))
-        known = set(book.sheet_names)
-        rows = {name: book.get_sheet_by_name(name).to_python() for name in names if name in known}
-    except Exception as error:  # calamine raises its own error types, which are no part of its public interface
-        raise MotionError(f"{path} is not a readable .xlsx workbook: {error}") from error
-    for name in names:
-        if name not in rows:
-            raise MotionError(f"{path}: sheet {name!r} is missing; it has {sorted(known)}")
-    result = {name: _table(path, name, rows[name]) for name in names}
-    counts = {name: len(table) for name, table in result.items()}
-    if len(set(counts.values())) > 1:
-        raise MotionError(f"{path}: sheets have unequal row counts {counts}")
-    return result
-
-
-def _table(path: Path, sheet: str, rows: list[list[object]]) -> FloatArray:
-    if not rows or tuple(str(cell) for cell in rows[0][:7]) != _HEADER:
-        raise MotionError(f"{path}, sheet {sheet!r}: first row must be {', '.join(_HEADER)}; got {rows[:1]}")
-    try:
-        table = np.array([row[:7] for row in rows[1:]], dtype=np.float64).reshape(-1, 7)
-    except (TypeError, ValueError) as error:
-        raise MotionError(f"{path}, sheet {sheet!r}: a cell is no number: {error}") from error
-    if len(table) == 0:
-        raise MotionError(f"{path}, sheet {sheet!r}: no rows")
-    bad = np.argwhere(~np.isfinite(table))
-    if len(bad):
-        row, column = bad[0]
-        raise MotionError(f"{path}, sheet {sheet!r}, row {row + 2}: {_HEADER[column]} is not a finite number")
-    return table

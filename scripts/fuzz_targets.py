@@ -1,0 +1,278 @@
+"""Everything that reads from outside, with valid samples and the ways to damage them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fuzz_damage import Damage, in_archive, in_bytes, in_json, in_json_lines, in_weights, mixed
+
+import syda_gym
+from syda_gym.agents.bundle import load_agent, save_agent
+from syda_gym.agents.checkpoint import load_checkpoint
+from syda_gym.agents.classical import make_rival
+from syda_gym.agents.interface import Interface
+from syda_gym.agents.predictor import Predictor
+from syda_gym.agents.tcn import TcnShape
+from syda_gym.embodiments import catalog
+from syda_gym.embodiments.robot import Robot
+from syda_gym.embodiments.urdf import read_urdf
+from syda_gym.evaluation.benchmark.config import BenchmarkConfig
+from syda_gym.files import asset, fingerprint, read_json, write_json
+from syda_gym.motions.dataset import write_dataset
+from syda_gym.motions.loading import FORMATS
+from syda_gym.teleoperation import TeleoperationLoop
+from syda_gym.teleoperation.journal import Journal, replay_journal
+from syda_gym.teleoperation.packets import PacketDecoder, encode_frame, encode_request
+from syda_gym.teleoperation.tick import Tick
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+from motions import paper_workbooks, recordings  # sample recordings are written by the tests
+
+__all__ = ["Target", "all_targets"]
+
+
+@dataclass(frozen=True)
+class Target:
+    """Something that reads.
+
+    Attributes:
+        name: what it is called in the results.
+        samples: what it likes.
+        read: how it is called.
+        damage: how its samples are damaged.
+        share: how many inputs it gets, relative to the others.
+    """
+
+    name: str
+    samples: list[bytes]
+    read: Callable[[bytes], Any]
+    damage: Damage = in_bytes
+    share: float = 1.0
+
+
+def all_targets(folder: Path) -> list[Target]:
+    """Every target, with its samples written into ``folder``."""
+    return [
+        *motion_targets(folder),
+        *mapping_targets(folder),
+        *agent_targets(folder),
+        *robot_targets(folder),
+        *live_targets(folder),
+        benchmark_target(folder),
+    ]
+
+
+def motion_targets(folder: Path) -> list[Target]:
+    """Every format of ``load_motions``."""
+
+    def file_target(name: str, files: list[Path], damage: Damage = in_bytes) -> Target:
+        place = folder / f"damaged-{name}{files[0].suffix}"
+
+        def read(data: bytes) -> Any:
+            place.write_bytes(data)
+            return FORMATS[name].read(place)
+
+        return Target(f"motions-{name}", [file.read_bytes() for file in files], read, damage)
+
+    def text(name: str, content: str) -> Path:
+        (folder / name).write_text(content)
+        return folder / name
+
+    few = few_motions()
+    syda_gym.save_motions(few, folder / "few.npz")
+    kinect = recordings.write_rows(folder / "kinect.csv", recordings.kinect_rows(12))
+    openni = recordings.write_rows(folder / "openni.txt", recordings.openni_rows(12), separator=" ", end="")
+    pose = {"fps": 25, "frames": recordings.mediapipe_json(4)}
+    return [
+        file_target("npz", [folder / "few.npz"], mixed(in_archive)),
+        file_target("kinect", [kinect]),
+        file_target("openni", [openni, text("cornell.txt", "\n".join(recordings.cornell_lines(6)))]),
+        file_target("bvh", [text("walk.bvh", recordings.bvh_text())]),
+        file_target("mediapipe", [text("pose.json", recordings.json_text(pose))], mixed(in_json)),
+        paper_target(folder),
+        *pairs_targets(folder, few),
+    ]
+
+
+def few_motions() -> syda_gym.Motions:
+    """Two short synthetic takes."""
+    tiny = syda_gym.load_motions("embedded", fps=2)
+    return syda_gym.Motions(tiny.name, tiny.takes[:2], tiny.bodies, tiny.families, synthetic=True)
+
+
+def paper_target(folder: Path) -> Target:
+    """A data set of small workbooks, one of which is damaged."""
+    root = paper_workbooks.write_dataset(folder / "paper")
+    victim = root / "Pepper2Human" / "human_P01A01T01.xlsx"
+    read = replacing(victim, lambda: FORMATS["paper"].read(root))
+    return Target("motions-paper", [victim.read_bytes()], read, mixed(in_archive))
+
+
+def pairs_targets(folder: Path, motions: syda_gym.Motions) -> list[Target]:
+    """The index and one table of a data set folder."""
+    root = write_dataset(motions, folder / "pairs")
+    index = root / "dataset.json"
+    table = next(iter(sorted(root.rglob("*.csv"))))
+
+    def read() -> Any:
+        return FORMATS["pairs"].read(root)
+
+    return [
+        Target("motions-pairs-index", [index.read_bytes()], replacing(index, read), mixed(in_json)),
+        Target("motions-pairs-table", [table.read_bytes()], replacing(table, read)),
+    ]
+
+
+def mapping_targets(folder: Path) -> list[Target]:
+    """The two files of a stored mapping, damaged one at a time; half of the weights come with a card that fits them."""
+    pair = syda_gym.load_motions("embedded", fps=2).pair("adult", "pepper")
+    pair = pair.only_actions(pair.action_names[:4])
+    for name, method in (("ridge", "ridge"), ("near", "nearest"), ("syda", "syda")):
+        syda_gym.save_mapping(syda_gym.fit(pair, method=method, seed=0), folder / name)
+    weights, card = folder / "ridge.safetensors", folder / "ridge.json"
+
+    def read() -> Any:
+        return syda_gym.load_mapping(folder / "ridge")
+
+    def read_marked(data: bytes) -> Any:
+        content = read_json(folder / "near.json")
+        write_json(folder / "marked.json", {**content, "weights": fingerprint(data)})
+        (folder / "marked.safetensors").write_bytes(data)
+        return syda_gym.load_mapping(folder / "marked")
+
+    near = (folder / "near.safetensors").read_bytes()
+    return [
+        Target("mapping-weights", [weights.read_bytes(), near], replacing(weights, read), share=0.5),
+        Target("mapping-weights-marked", [near], read_marked, mixed(in_weights)),
+        Target("mapping-card", [card.read_bytes()], replacing(card, read), mixed(in_json)),
+        Target(
+            "mapping-card-syda",
+            [(folder / "syda.json").read_bytes()],
+            replacing(folder / "syda.json", lambda: syda_gym.load_mapping(folder / "syda")),
+            mixed(in_json),
+        ),
+    ]
+
+
+def agent_targets(folder: Path) -> list[Target]:
+    """The two files of an agent's bundle, and a training's checkpoint."""
+    robot = catalog.get("pepper")
+    n = robot.n_features
+    parts = {"base_error": n, "q": n, "qd": n, "packet_age": 1}
+    ends = np.cumsum(list(parts.values())).tolist()
+    layout = {name: slice(end - size, end) for (name, size), end in zip(parts.items(), ends, strict=True)}
+    interface = Interface(robot, layout, ends[-1], 1 / 30, 0.5)
+    rng = np.random.default_rng(0)
+    shapes = TcnShape(3 * n + 1, 4, n).shapes()
+    stored = {name: rng.normal(0, 0.1, size).astype(np.float32) for name, size in shapes.items()}
+    agent = Predictor(interface, make_rival("kalman", interface), weights=stored, channels=4)
+    card = save_agent(agent, folder / "agent")
+    weights = card.with_suffix(".safetensors")
+
+    def read() -> Any:
+        loaded = load_agent(folder / "agent", interface)
+        loaded.reset(1)
+        return loaded.act(np.zeros((1, interface.size)))
+
+    def read_checkpoint(data: bytes) -> Any:
+        (folder / "training.safetensors").write_bytes(data)
+        return load_checkpoint(folder / "training.safetensors")
+
+    return [
+        Target("agent-card", [card.read_bytes()], replacing(card, read), mixed(in_json)),
+        Target("agent-weights", [weights.read_bytes()], replacing(weights, read), mixed(in_weights)),
+        Target("agent-checkpoint", [checkpoint_bytes()], read_checkpoint, mixed(in_weights)),
+    ]
+
+
+def checkpoint_bytes() -> bytes:
+    """A small file of the kind that a training writes."""
+    import json
+
+    from safetensors.numpy import save
+
+    about = {"format": 1, "state": {"seed": 0}, "groups": {}, "steps": 8, "updates": 1}
+    return save({"policy/weight": np.zeros((2, 3), dtype=np.float32)}, metadata={"training": json.dumps(about)})
+
+
+def robot_targets(folder: Path) -> list[Target]:
+    """Robot descriptions and URDFs."""
+    description = folder / "robot.yaml"
+    urdf = folder / "robot.urdf"
+    for name in ("nao.urdf", "pepper.urdf"):
+        (folder / name).write_bytes(asset("robots", name).read_bytes())
+
+    def read_description(data: bytes) -> Any:
+        description.write_bytes(data)
+        return Robot.read(description)
+
+    def read_tree(data: bytes) -> Any:
+        urdf.write_bytes(data)
+        return read_urdf(urdf)
+
+    descriptions = [asset("robots", f"{name}.yaml").read_bytes() for name in ("nao", "pepper")]
+    return [
+        Target("robot-yaml", descriptions, read_description, share=0.6),
+        Target("robot-urdf", [asset("robots", "nao.urdf").read_bytes()], read_tree, share=0.6),
+    ]
+
+
+def live_targets(folder: Path) -> list[Target]:
+    """Packets of the live sources, with and without a token, and the journal of a run."""
+    body = catalog.get("adult")
+    frame = np.linspace(-0.3, 0.3, body.n_features)
+    samples = [
+        encode_frame(1, 0.5, frame),
+        encode_frame(2, 1.5, frame, token="secret", confidence=0.5),
+        encode_request(3, 2.0, "pause"),
+    ]
+    mapping = syda_gym.load_mapping(folder / "ridge")
+    loop = TeleoperationLoop(mapping)
+    journal = folder / "run.jsonl"
+    with Journal(journal, loop) as writing:
+        for number in range(12):
+            tick = Tick(
+                100.0 + number / 30, frame if number % 3 else None, None, 1.0, ("pause",) if number == 8 else ()
+            )
+            writing.decided(tick, loop.step(tick))
+    return [
+        Target("network-open", samples, PacketDecoder(body), mixed(in_json), share=3.0),
+        Target("network-token", samples, PacketDecoder(body, token="secret"), mixed(in_json), share=3.0),
+        Target(
+            "journal",
+            [journal.read_bytes()],
+            replacing(journal, lambda: replay_journal(journal, mapping)),
+            mixed(in_json_lines),
+        ),
+    ]
+
+
+def benchmark_target(folder: Path) -> Target:
+    """A benchmark's configuration (JSON is YAML)."""
+    text = (
+        b'{"motions": "embedded", "routes": ["adult>pepper", "adult>kid>pepper"], "methods": ["syda", "direct"], '
+        b'"agents": ["base", "lead"], "seeds": [0, 1], "folds": 2, "fit": {"syda": {"epochs": 3}}, "efficiency": '
+        b'{"chain": "adult>kid>pepper", "new_body": "adult", "actions": [1, 2], "draws": 2}}'
+    )
+    place = folder / "study.yaml"
+    place.write_bytes(text)
+    return Target("benchmark-yaml", [text], replacing(place, lambda: BenchmarkConfig.read(place)), mixed(in_json))
+
+
+def replacing(path: Path, read: Callable[[], Any]) -> Callable[[bytes], Any]:
+    """A reader of bytes that puts them at ``path`` for as long as it reads."""
+    good = path.read_bytes()
+
+    def reader(data: bytes) -> Any:
+        path.write_bytes(data)
+        try:
+            return read()
+        finally:
+            path.write_bytes(good)
+
+    return reader
