@@ -14,8 +14,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import yaml
 
-__all__ = ["Damage", "in_archive", "in_bytes", "in_json", "in_json_lines", "in_weights", "mixed"]
+__all__ = ["Damage", "in_archive", "in_bytes", "in_json", "in_json_lines", "in_weights", "in_yaml", "mixed"]
 
 Damage = Callable[[list[bytes], np.random.Generator], bytes]
 """From valid samples and a generator to one damaged input."""
@@ -98,6 +99,11 @@ def in_json(samples: list[bytes], rng: np.random.Generator) -> bytes:
     """A JSON text in which up to three values were replaced, removed, or moved elsewhere."""
     value = json.loads(samples[rng.integers(len(samples))])
     return json.dumps(_wounded(value, rng)).encode()
+
+
+def in_yaml(samples: list[bytes], rng: np.random.Generator) -> bytes:
+    """A YAML text, written anew as JSON (which is YAML), in which values were replaced, removed or moved."""
+    return json.dumps(_wounded(yaml.safe_load(samples[rng.integers(len(samples))]), rng)).encode()
 
 
 def in_json_lines(samples: list[bytes], rng: np.random.Generator) -> bytes:

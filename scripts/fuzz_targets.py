@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fuzz_damage import Damage, in_archive, in_bytes, in_json, in_json_lines, in_weights, mixed
+from fuzz_damage import Damage, in_archive, in_bytes, in_json, in_json_lines, in_weights, in_yaml, mixed
 
 import syda_gym
 from syda_gym.agents.bundle import load_agent, save_agent
@@ -217,7 +217,7 @@ def robot_targets(folder: Path) -> list[Target]:
 
     descriptions = [asset("robots", f"{name}.yaml").read_bytes() for name in ("nao", "pepper")]
     return [
-        Target("robot-yaml", descriptions, read_description, share=0.6),
+        Target("robot-yaml", descriptions, read_description, mixed(in_yaml), share=0.6),
         Target("robot-urdf", [asset("robots", "nao.urdf").read_bytes()], read_tree, share=0.6),
     ]
 
@@ -253,15 +253,20 @@ def live_targets(folder: Path) -> list[Target]:
 
 
 def benchmark_target(folder: Path) -> Target:
-    """A benchmark's configuration (JSON is YAML)."""
-    text = (
-        b'{"motions": "embedded", "routes": ["adult>pepper", "adult>kid>pepper"], "methods": ["syda", "direct"], '
-        b'"agents": ["base", "lead"], "seeds": [0, 1], "folds": 2, "fit": {"syda": {"epochs": 3}}, "efficiency": '
-        b'{"chain": "adult>kid>pepper", "new_body": "adult", "actions": [1, 2], "draws": 2}}'
-    )
+    """A benchmark's configuration."""
+    text = b"""
+motions: embedded
+routes: [adult>pepper, adult>kid>pepper]
+methods: [syda, direct]
+agents: [base, lead]
+seeds: [0, 1]
+folds: 2
+fit: {syda: {epochs: 3}}
+efficiency: {chain: adult>kid>pepper, new_body: adult, actions: [1, 2], draws: 2}
+"""
     place = folder / "study.yaml"
     place.write_bytes(text)
-    return Target("benchmark-yaml", [text], replacing(place, lambda: BenchmarkConfig.read(place)), mixed(in_json))
+    return Target("benchmark-yaml", [text], replacing(place, lambda: BenchmarkConfig.read(place)), mixed(in_yaml))
 
 
 def replacing(path: Path, read: Callable[[], Any]) -> Callable[[bytes], Any]:

@@ -25,9 +25,10 @@ def test_json_round_trip_and_limits(tmp_path):
         read_json(path, limit=3)
     with pytest.raises(StorageError, match="no file"):
         read_json(tmp_path / "y.json")
-    path.write_text("{")
-    with pytest.raises(StorageError, match="not valid JSON"):
-        read_json(path)
+    for text in ("{", "[" * 100_000):  # the second is nested deeper than the parser's stack
+        path.write_text(text)
+        with pytest.raises(StorageError, match="not valid JSON"):
+            read_json(path)
 
 
 def test_a_folder_that_is_a_file_cannot_be_written_to(tmp_path):

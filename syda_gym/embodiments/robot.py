@@ -94,7 +94,7 @@ class RobotDescription:
             raise EmbodimentError(f"no robot description {file}; write one with `syda-gym robot add URDF`")
         try:
             data = yaml.safe_load(file.read_text(encoding="utf-8"))
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
+        except (yaml.YAMLError, ValueError, RecursionError) as error:
             raise EmbodimentError(f"{file} is not valid YAML: {error}") from error
         needed = {"name", "urdf", "torso", "height", "arms"}
         allowed = needed | {"coupled_limits", "rest", "disabled_collisions", "axes"}

@@ -153,9 +153,10 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         return tuple(self._painter.picture(self._fleet, index) for index in range(self.num_envs))
 
     def close_extras(self, **_: Any) -> None:
-        """Releases physics and camera."""
-        self._fleet.close()
-        self._painter.close()
+        """Releases physics and camera; Gymnasium calls this for an object whose constructor raised, too."""
+        if hasattr(self, "_painter"):
+            self._fleet.close()
+            self._painter.close()
 
     def _step_and_restart(self, actions: NDArray[np.float32]) -> Result:
         fleet = self._fleet

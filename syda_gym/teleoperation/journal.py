@@ -167,9 +167,10 @@ def replay_journal(path: str | os.PathLike[str], mapping: Mapping) -> ReplayRepo
                 f"{path}, line 1: expected {key!r} to be a {kind.__name__}; the journal is damaged"
             )
     if list(mapping.route) != head["route"] or json.loads(json.dumps(mapping.card.to_json())) != head["mapping"]:
+        route, method = " > ".join(map(str, head["route"])), head["mapping"].get("method")
         raise TeleoperationError(
-            f"the journal was written with {' > '.join(head['route'])} ({head['mapping'].get('method')}); the mapping "
-            f"given is {mapping!r} or another fit of it; give the mapping of that run"
+            f"the journal was written with {route} ({method}); the mapping given is {mapping!r} or another fit "
+            "of it; give the mapping of that run"
         )
     try:
         settings, start = LoopSettings.from_json(head["settings"]), np.array(head["start"], dtype=np.float64)

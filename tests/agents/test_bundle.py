@@ -91,6 +91,22 @@ def test_damaged_and_foreign_files_are_refused(stored, ground):
         load_agent(path, ground.interface)
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"stack": [None]},
+        {"stack": [{"agent": "base", "settings": 1.5}]},
+        {"interface": {"robot": [], "layout": 3}},
+        {"interface": {"robot": "pepper"}},
+    ],
+)
+def test_a_card_with_values_of_other_kinds_is_refused(stored, ground, change):
+    path = stored[1].with_suffix(".json")
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(StorageError, match=r"deep\.json is damaged"):
+        load_agent(path, ground.interface)
+
+
 def test_an_interrupted_write_leaves_the_earlier_bundle_intact(stored, ground, monkeypatch):
     _, path = stored
     before = {suffix: path.with_suffix(suffix).read_bytes() for suffix in (".json", ".safetensors")}

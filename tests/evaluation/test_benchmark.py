@@ -78,6 +78,8 @@ def computed(small_motions, tmp_path_factory):
         ("methods: [sida]", OptionError, "did you mean 'syda'"),
         ("methods: ['syda:papr']", OptionError, "did you mean 'paper'"),
         ("agents: [leed]", OptionError, "did you mean 'lead'"),
+        ("agents: ['.']", OptionError, "unknown agent '.'"),
+        ("motions: 2026-99-99", StorageError, "not valid YAML"),
         ("disturbances: ['teleop:ful']", OptionError, "full"),
         ("seeds: -1", OptionError, "list of whole numbers"),
         ("folds: 1", OptionError, "at least 2"),

@@ -80,6 +80,15 @@ def test_arbitrary_cards_are_refused(mapping, tmp_path, content):
         load_mapping(tmp_path / "m")
 
 
+def test_a_number_beyond_all_bounds_is_refused(adult_pepper, tmp_path):
+    save_mapping(fit(adult_pepper, method="ridge"), tmp_path / "m")
+    content = json.loads((tmp_path / "m.json").read_text())
+    content["links"][0]["regressor"]["settings"]["width"] = float("inf")
+    (tmp_path / "m.json").write_text(json.dumps(content))
+    with pytest.raises(StorageError, match="do not fit together"):
+        load_mapping(tmp_path / "m")
+
+
 def test_weights_of_another_size_are_refused(mapping, tmp_path):
     from safetensors.numpy import load_file, save_file
 

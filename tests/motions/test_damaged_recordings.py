@@ -40,6 +40,11 @@ def _replaced(lines: list[str], index: int, line: str) -> list[str]:
     return [*lines[:index], line, *lines[index + 1 :]]
 
 
+def _short(value: object) -> str | None:
+    """Whole files would make the names of tests unreadable."""
+    return "file" if len(str(value)) > 60 else None
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -61,6 +66,7 @@ def _replaced(lines: list[str], index: int, line: str) -> list[str]:
         ("timestamp,x,y\n1,2,3", "expected HIERARCHY; this is not a BVH file"),
         ("", "is empty"),
     ],
+    ids=_short,
 )  # fmt: skip
 def test_damaged_bvh(tmp_path: Path, content: str, message: str) -> None:
     with pytest.raises(MotionError, match=message) as caught:
@@ -168,6 +174,7 @@ def test_damaged_landmark_npz(tmp_path: Path, arrays: dict[str, np.ndarray], mes
         ("clip.json", "text", "no joint is named|no valid"),
         ("clip.txt", "just some words", "line 1: 3 columns; expected"),
     ],
+    ids=_short,
 )
 def test_file_that_is_not_what_its_ending_says(
     tmp_path: Path, name: str, content: str | list[str], message: str | None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -177,6 +178,20 @@ def test_truncated_workbook(small: Path) -> None:
     path.write_bytes(path.read_bytes()[:-700])
     with pytest.raises(MotionError, match=r"human_P01A01T01\.xlsx"):
         read_paper(small)
+
+
+@pytest.mark.parametrize("cell", [b"G9999999", b"ZZZZ2", b"A999999999999999999999"])
+def test_a_cell_far_out_does_not_take_all_memory(small: Path, cell: bytes) -> None:
+    path = small / "Pepper" / "pepper_P01A01T01.xlsx"
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    sheet = "xl/worksheets/sheet2.xml"
+    members[sheet] = members[sheet].replace(b'r="G3"', b'r="' + cell + b'"')
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    with pytest.raises(MotionError, match=r"pepper_P01A01T01\.xlsx: cell .* lies beyond"):
+        load_motions(f"paper:{small}")
 
 
 def test_empty_folder(small: Path) -> None:

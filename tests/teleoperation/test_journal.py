@@ -106,3 +106,16 @@ def test_another_mapping_another_file_or_a_broken_line_is_refused(
     path.write_text("\n".join(lines) + "\n")
     with pytest.raises(TeleoperationError, match="line 6: not a decision"):
         replay_journal(path, mapping)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("mapping", None), ("settings", {"rate": [1]}), ("settings", {"speed": "x"}), ("start", ["a"])]
+)
+def test_a_first_line_with_values_of_other_kinds_is_refused(
+    tmp_path: Path, mapping: LimbMapping, key: str, value: object
+) -> None:
+    path = tmp_path / "run.jsonl"
+    Journal(path, TeleoperationLoop(mapping)).close()
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}) + "\n")
+    with pytest.raises(TeleoperationError, match="line 1: "):
+        replay_journal(path, mapping)

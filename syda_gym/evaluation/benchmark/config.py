@@ -168,7 +168,7 @@ class BenchmarkConfig:
             raise StorageError(f"{file} is larger than {_MAX_BYTES} bytes; expected a short YAML file")
         try:
             data = yaml.safe_load(file.read_text(encoding="utf-8"))
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
+        except (yaml.YAMLError, ValueError, RecursionError) as error:
             raise StorageError(f"{file} is not valid YAML: {' '.join(str(error).split())}") from error
         if not isinstance(data, dict):
             raise OptionError(f"{file}: expected keys and values, got {type(data).__name__}")
