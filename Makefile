@@ -8,13 +8,27 @@ OUT ?= demo-output
 export OMP_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test lint types check docs wheel clean
+.PHONY: demo test coverage lowest lint types check docs wheel clean
 
 demo: $(BASE)
 	$(BIN)/syda-gym demo --out $(OUT)
 
 test: $(DEVELOPMENT)
 	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+# Lines and branches of the package that the tests reach, as a table and as coverage/index.html.
+coverage: $(DEVELOPMENT)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --cov --cov-report=term-missing:skip-covered --cov-report=html:coverage
+
+# The tests of the lower floors with the lowest versions that pyproject.toml allows.
+LOWEST := .venv/lowest
+lowest: $(BASE)
+	$(PYTHON) -m venv --clear $(LOWEST)
+	$(LOWEST)/bin/python -m pip install --quiet uv "torch==2.13.0"
+	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct \
+		-e ".[dev,train,ik,bvh,live,export]"
+	$(LOWEST)/bin/python -m pytest -p no:cacheprovider tests/embodiments tests/motions tests/mappings tests/simulation \
+		tests/envs tests/test_cli.py
 
 lint: $(DEVELOPMENT)
 	$(BIN)/ruff check .
@@ -46,4 +60,4 @@ $(DEVELOPMENT): $(BASE)
 	touch $@
 
 clean:
-	rm -rf .venv demo-output dist site .pytest_cache .mypy_cache .ruff_cache
+	rm -rf .venv demo-output dist site coverage .pytest_cache .mypy_cache .ruff_cache

@@ -33,7 +33,7 @@ PARSED = {
     "syda-gym transferability --validate": "minutes; tests/evaluation/test_prediction.py",
     "syda-gym record": "needs a person; tests/teleoperation/test_recording.py",
     "syda-gym motions pair": "needs recordings of a person; tests/motions/test_session.py",
-    "syda-gym teleop --robot nao --source udp:9870 --sink naoqi": "needs a robot; tests/teleoperation/test_naoqi.py",
+    "syda-gym teleop --robot nao --source udp:9870 --sink naoqi:tcp://nao.local:9559": "needs a robot; test_naoqi.py",
     "syda-gym teleop --source udp:9870 --sink window": "needs a screen",
     "syda-gym teleop --robot my-robot --motions my-pairs --source udp:9870 --sink window": "needs a screen",
 }

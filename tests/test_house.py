@@ -27,9 +27,6 @@ def test_imports_run_one_way() -> None:
 
 @pytest.mark.parametrize("path", MODULES, ids=name)
 class TestModule:
-    def test_stays_below_500_lines(self, path: Path) -> None:
-        assert len(path.read_text().splitlines()) < 500
-
     def test_says_what_it_is_for(self, path: Path) -> None:
         text = path.read_text()
         assert not text.strip() or ast.get_docstring(ast.parse(text)), "a module starts with its purpose"
@@ -90,3 +87,16 @@ def test_recordings_are_not_in_the_project() -> None:
     recorded = {".xlsx", ".xls", ".pkl", ".pt", ".pth"}
     found = [name(path) for folder in folders for path in folder.rglob("*") if path.suffix in recorded]
     assert not found
+
+
+def test_every_script_is_listed_and_says_what_it_is_for() -> None:
+    page = (ROOT / "CONTRIBUTING.md").read_text()
+    for path in (ROOT / "scripts").glob("*.py"):
+        assert f"`{path.stem}`" in page, f"CONTRIBUTING.md does not list {path.name}"
+        assert ast.get_docstring(ast.parse(path.read_text()))
+
+
+def test_no_file_grows_beyond_500_lines() -> None:
+    folders = [ROOT / part for part in ("syda_gym", "scripts", "tests", "examples")]
+    files = [path for folder in folders for path in folder.rglob("*") if path.suffix in (".py", ".js", ".css")]
+    assert not {name(path): count for path in files if (count := len(path.read_text().splitlines())) >= 500}

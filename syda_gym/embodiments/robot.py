@@ -99,25 +99,22 @@ class RobotDescription:
         needed = {"name", "urdf", "torso", "height", "arms"}
         allowed = needed | {"coupled_limits", "rest", "disabled_collisions", "axes"}
         if not isinstance(data, dict) or not needed <= set(data):
-            raise EmbodimentError(f"{file}: expected the keys {sorted(needed)}, got {data and sorted(data)}")
+            raise EmbodimentError(f"{file}: expected the keys {sorted(needed)}, got {data and sorted(map(str, data))}")
         for key in set(data) - allowed:
-            raise EmbodimentError(f"{file}: unknown key {key!r}; {nearest_name(key, allowed)}")
+            raise EmbodimentError(f"{file}: unknown key {key!r}; {nearest_name(str(key), allowed)}")
         try:
             return cls(
                 name=str(data["name"]),
                 urdf=(file.parent / str(data["urdf"])).resolve(),
                 torso=str(data["torso"]),
                 height=float(data["height"]),
-                arms=tuple(ArmDescription(**{**a, "joints": tuple(a["joints"])}) for a in data["arms"]),
-                coupled_limits=tuple(
-                    CoupledLimit(c["joint"], c["by"], tuple(c["at"]), tuple(c["lower"]), tuple(c["upper"]))
-                    for c in data.get("coupled_limits") or ()
-                ),
+                arms=tuple(_arm(a) for a in data["arms"]),
+                coupled_limits=tuple(_coupled_limit(c) for c in data.get("coupled_limits") or ()),
                 rest={str(k): float(v) for k, v in (data.get("rest") or {}).items()},
-                disabled_collisions=tuple((a, b) for a, b in data.get("disabled_collisions") or ()),
+                disabled_collisions=tuple((str(a), str(b)) for a, b in data.get("disabled_collisions") or ()),
                 axes=_rotation_rows(data["axes"]) if data.get("axes") else None,
             )
-        except (TypeError, KeyError, ValueError) as error:
+        except (TypeError, KeyError, ValueError, AttributeError, OverflowError) as error:
             raise EmbodimentError(f"{file}: a wrong value or key: {error}; see docs for the format") from error
 
 
@@ -308,6 +305,21 @@ class Robot(Embodiment):
             "joints": list(self.joint_names),
             "kinematics": fingerprint(numbers, self.lower.tobytes(), self.upper.tobytes()),
         }
+
+
+def _arm(entry: Any) -> ArmDescription:
+    arm = ArmDescription(**{**entry, "joints": tuple(entry["joints"])})
+    for name in (*arm.joints, arm.side, arm.shoulder, arm.elbow, arm.wrist, arm.tip):
+        if not isinstance(name, str):
+            raise ValueError(f"arms are described by names of joints and links, got {name!r}")
+    return arm
+
+
+def _coupled_limit(entry: Any) -> CoupledLimit:
+    at, lower, upper = (tuple(float(value) for value in entry[key]) for key in ("at", "lower", "upper"))
+    if not 0 < len(at) == len(lower) == len(upper):
+        raise ValueError(f"at, lower and upper of a coupled limit need equally many numbers, got {entry}")
+    return CoupledLimit(str(entry["joint"]), str(entry["by"]), at, lower, upper)
 
 
 def _rotation_rows(value: Any) -> tuple[tuple[float, float, float], ...]:

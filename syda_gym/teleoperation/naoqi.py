@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from syda_gym.teleoperation.tick import Decision, State
 
 __all__ = ["NaoqiSink"]
 
+_PORT = 9559  # NAOqi's own
 _TIMEOUT = 5.0  # s; for connecting and for calls outside the loop
 
 
@@ -66,6 +69,7 @@ class NaoqiSink(Sink):
             import qi
         except ImportError as error:
             raise MissingExtraError("a NAOqi robot", "naoqi") from error
+        self._knock()
         session = qi.Session()
         try:
             session.connect(self.url, _async=True).value(int(_TIMEOUT * 1000))
@@ -76,6 +80,7 @@ class NaoqiSink(Sink):
             self._motion.getAngles(self._names, True)
         except RuntimeError as error:
             self._motion = None
+            session.close()
             raise TeleoperationError(
                 f"no NAOqi robot with the arm joints of {self.robot.name!r} at {self.url}: {error}; check address, "
                 "network and that the robot is on"
@@ -129,6 +134,18 @@ class NaoqiSink(Sink):
         if self._session is not None:
             self._session.close()
             self._session = None
+
+    def _knock(self) -> None:
+        """Looks whether anything listens: a ``qi`` session that cannot connect may block for ever when it is freed."""
+        address = urlsplit(self.url)
+        try:
+            if address.hostname is None:
+                raise ValueError("expected tcp://HOST:PORT")
+            socket.create_connection((address.hostname, address.port or _PORT), timeout=_TIMEOUT).close()
+        except (OSError, ValueError) as error:
+            raise TeleoperationError(
+                f"no NAOqi robot at {self.url}: {error}; check address, network and that the robot is on"
+            ) from error
 
     def _run(self) -> None:
         while True:

@@ -17,7 +17,8 @@ from syda_gym.agents.streams import play_streams
 from syda_gym.agents.tcn import TcnShape
 from syda_gym.embodiments import catalog
 from syda_gym.errors import AgentError, StorageError
-from tests.agents.test_residual import random_policy
+
+from .test_residual import random_policy
 
 
 def deep_stack(interface):
@@ -96,7 +97,6 @@ def test_damaged_and_foreign_files_are_refused(stored, ground):
     [
         {"stack": [None]},
         {"stack": [{"agent": "base", "settings": 1.5}]},
-        {"interface": {"robot": [], "layout": 3}},
         {"interface": {"robot": "pepper"}},
     ],
 )

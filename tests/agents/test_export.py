@@ -17,7 +17,8 @@ from syda_gym.agents.stacks import stack_spec
 from syda_gym.agents.streams import play_streams, read_stream
 from syda_gym.errors import AgentError, MissingExtraError, StorageError
 from syda_gym.files import asset, read_json
-from tests.agents.test_bundle import deep_stack
+
+from .test_bundle import deep_stack
 
 pytest.importorskip("onnxruntime", reason="SKIPPED LOUDLY: the extra 'export' is not installed")
 

@@ -124,6 +124,8 @@ def _description(tmp_path, **changes):
         ({"torso": "tors"}, "did you mean 'torso'"),
         ({"urdf": "nowhere.urdf"}, "no URDF"),
         ({"height": "tall"}, "wrong value"),
+        ({"rest": 3}, "wrong value"),
+        ({"coupled_limits": [{"joint": "a", "by": "b", "at": [0, 1], "lower": [0], "upper": [1, 2]}]}, "equally many"),
     ],
 )
 def test_bad_descriptions_say_what_to_do(tmp_path, changes, message):
@@ -136,6 +138,8 @@ def test_bad_arms_are_named(tmp_path):
     wrong = [{**arms[0], "joints": ["LShoulderPich", *arms[0]["joints"][1:]]}, arms[1]]
     with pytest.raises(EmbodimentError, match="did you mean 'LShoulderPitch'"):
         Robot.read(_description(tmp_path, arms=wrong))
+    with pytest.raises(EmbodimentError, match="names of joints and links, got 3"):
+        Robot.read(_description(tmp_path, arms=[{**arms[0], "wrist": 3}, arms[1]]))
     reordered = [{**arms[0], "joints": arms[0]["joints"][::-1]}, arms[1]]
     with pytest.raises(EmbodimentError, match="does not come after"):
         Robot.read(_description(tmp_path, arms=reordered))

@@ -81,6 +81,7 @@ def computed(small_motions, tmp_path_factory):
         ("agents: ['.']", OptionError, "unknown agent '.'"),
         ("motions: 2026-99-99", StorageError, "not valid YAML"),
         ("disturbances: ['teleop:ful']", OptionError, "full"),
+        ("seeds: 1000000000000", OptionError, "at most 10000"),
         ("seeds: -1", OptionError, "list of whole numbers"),
         ("folds: 1", OptionError, "at least 2"),
         ("routes: [adult]", OptionError, "adult>kid>pepper"),

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import LimbMapping
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
@@ -17,6 +16,8 @@ from syda_gym.errors import TeleoperationError
 from syda_gym.teleoperation.journal import Journal, read_journal, replay_journal
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.tick import LoopSettings, Tick
+
+from .conftest import LimbMapping
 
 Wave = Callable[[float], FloatArray]
 

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import LimbMapping
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
@@ -26,6 +25,8 @@ from syda_gym.teleoperation.sinks import ManySinks, MemorySink, UdpSink
 from syda_gym.teleoperation.sources import ReplaySource, Source, UdpSource, WebSocketSource
 from syda_gym.teleoperation.statistics import LiveStatistics
 from syda_gym.teleoperation.tick import LoopSettings, State
+
+from .conftest import LimbMapping
 
 Wave = Callable[[float], FloatArray]
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from conftest import LimbMapping
 
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import FloatArray
@@ -15,6 +14,8 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MappingError, OptionError, TeleoperationError
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.tick import Decision, LoopSettings, State, Tick
+
+from .conftest import LimbMapping
 
 DT = 1 / 30
 Wave = Callable[[float], FloatArray]

@@ -97,8 +97,9 @@ def test_commands_reach_the_robot_newest_first(served: tuple[str, ALMotion], pep
 
 
 def test_no_robot_and_bad_settings_are_named(pepper: Robot) -> None:
-    with pytest.raises(TeleoperationError, match="no NAOqi robot"):
-        NaoqiSink(pepper, "tcp://127.0.0.1:1").open()
+    for url in ("tcp://127.0.0.1:1", "tcp://", "tcp://127.0.0.1:port"):
+        with pytest.raises(TeleoperationError, match="no NAOqi robot"):
+            NaoqiSink(pepper, url).open()
     with pytest.raises(OptionError, match="speed fraction"):
         NaoqiSink(pepper, speed=0.0)
     with pytest.raises(TeleoperationError, match="not open"):

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import LimbMapping
 from typer.testing import CliRunner
 
 from syda_gym.embodiments.human import HumanSkeleton
@@ -24,6 +23,8 @@ from syda_gym.teleoperation.sinks import ManySinks, MemorySink, UdpSink
 from syda_gym.teleoperation.sources import ReplaySource, UdpSource, WebSocketSource
 from syda_gym.teleoperation.statistics import LiveStatistics
 from syda_gym.teleoperation.tick import Decision, LoopSettings, State
+
+from .conftest import LimbMapping
 
 
 def test_addresses_become_sources(adult: HumanSkeleton) -> None:

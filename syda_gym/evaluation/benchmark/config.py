@@ -15,6 +15,7 @@ from syda_gym.motions.clip import Motions
 __all__ = ["BenchmarkConfig", "EfficiencyConfig", "split_method"]
 
 _MAX_BYTES = 2**20
+_MAX_SEEDS = 10_000
 
 
 @dataclass(frozen=True)
@@ -110,8 +111,10 @@ class BenchmarkConfig:
             given = [self.routes] if isinstance(self.routes, str) else self.routes
             object.__setattr__(self, "routes", tuple(_route(route) for route in given))
         given_seeds: Any = self.seeds  # YAML brings a number as well as a list
-        seeds = range(given_seeds) if isinstance(given_seeds, int) else given_seeds
+        seeds = range(min(given_seeds, _MAX_SEEDS + 1)) if isinstance(given_seeds, int) else given_seeds
         object.__setattr__(self, "seeds", _whole_numbers("seeds", seeds, 0))
+        if len(self.seeds) > _MAX_SEEDS:
+            raise OptionError(f"seeds: at most {_MAX_SEEDS} can be asked for at once")
         plan: Any = self.efficiency
         if isinstance(plan, Mapping):
             object.__setattr__(self, "efficiency", _build(EfficiencyConfig, plan, "efficiency."))
