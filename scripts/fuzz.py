@@ -1,12 +1,13 @@
 """Feeds damaged files and packets to everything that reads from outside, and reports what is not one of our exceptions.
 
-    python scripts/fuzz.py [--inputs 120000] [--seconds 900] [--seed 0] [--only NAME] [--out docs/results/fuzz.json]
+    python scripts/fuzz.py [--inputs 5000] [--seeds 20] [--first 0] [--only NAME] [--out docs/results/fuzz.json]
 
 Every reader of motions, stored mappings, agents and checkpoints, robot descriptions and URDFs, benchmark settings,
 journals and network packets gets valid samples that were damaged as bytes (cut, overwritten, repeated, mixed) or inside
 their container (a JSON value replaced, a member of an archive changed, a header of weights falsified). A reader may
 take what it gets or raise a ``SydaError``; anything else is a finding, as is an input that takes longer than the limit.
-Input ``number`` of a run follows from the seed and the number alone; findings are kept beside the results.
+An input follows from its seed and number alone. After each seed the results are written, and a seed that they hold
+already is not run again; findings are kept beside them.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ import os
 import signal
 import sys
 import tempfile
-import time
 import traceback
 import warnings
 from pathlib import Path
@@ -26,42 +26,41 @@ import numpy as np
 from fuzz_targets import Target, all_targets
 
 from syda_gym.errors import SydaError
-from syda_gym.files import write_json
+from syda_gym.files import read_json, write_json
 
 ROOT = Path(__file__).resolve().parents[1]
 LIMIT = 5.0  # s of processor time for one input
+Tally = dict[str, dict[str, int]]
 
 
 def main() -> int:
-    """Runs all targets in turn until the inputs or the time are used up."""
+    """Runs one seed after the other and adds up what was found."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--inputs", type=int, default=120_000)
-    parser.add_argument("--seconds", type=float, default=900.0, help="stop after this time")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--inputs", type=int, default=5_000, help="per seed")
+    parser.add_argument("--seeds", type=int, default=20, help="number of seeds")
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--only", default="", help="a part of the targets' names")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "results" / "fuzz.json")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     signal.signal(signal.SIGPROF, _too_long)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # the URDF parsers print what they dislike, from C++
+    result = {"inputs": 0, "seeds": [], "by_target": {}, "findings": []}
+    if options.out.is_file():
+        result = read_json(options.out)
     with tempfile.TemporaryDirectory() as folder:
         targets = [target for target in all_targets(Path(folder)) if options.only in target.name]
-        tally, findings = run(targets, options.inputs, options.seconds, options.seed, options.out.parent)
-    inputs = sum(tally[name]["inputs"] for name in tally)
-    result = {
-        "command": f"python scripts/fuzz.py --inputs {options.inputs} --seed {options.seed}",
-        "inputs": inputs,
-        "by_target": tally,
-        "findings": findings,
-    }
-    write_json(options.out, result)
-    print(f"{inputs} inputs, {len(findings)} findings: {options.out}")
-    return 1 if findings else 0
+        for seed in range(options.first, options.first + options.seeds):
+            if seed in result["seeds"]:
+                continue
+            add(result, seed, *run(targets, options.inputs, seed, options.out.parent))
+            result["command"] = f"python scripts/fuzz.py --inputs {options.inputs} --seeds {len(result['seeds'])}"
+            write_json(options.out, result)
+    print(f"{result['inputs']} inputs, {len(result['findings'])} findings: {options.out}")
+    return 1 if result["findings"] else 0
 
 
-def run(
-    targets: list[Target], inputs: int, seconds: float, seed: int, folder: Path
-) -> tuple[dict[str, dict[str, int]], list[dict[str, Any]]]:
+def run(targets: list[Target], inputs: int, seed: int, folder: Path) -> tuple[Tally, list[dict[str, Any]]]:
     """Gives every target its share of the inputs.
 
     Returns:
@@ -71,10 +70,7 @@ def run(
     tally = {target.name: {"inputs": 0, "read": 0} for target in targets}
     seen: set[tuple[str, str]] = set()
     findings: list[dict[str, Any]] = []
-    start = time.monotonic()
     for number in range(inputs):
-        if time.monotonic() - start > seconds:
-            break
         target = min(targets, key=lambda one: tally[one.name]["inputs"] / one.share)
         data = target.damage(target.samples, np.random.default_rng([seed, number]))
         outcome = attempt(target, data)
@@ -86,8 +82,19 @@ def run(
             kept.parent.mkdir(parents=True, exist_ok=True)
             kept.write_bytes(data)
             findings.append({"target": target.name, "number": number, "seed": seed, "problem": outcome})
-            print(f"{target.name}, input {number}: {outcome}", flush=True)
+            print(f"{target.name}, seed {seed}, input {number}: {outcome}", flush=True)
     return tally, findings
+
+
+def add(result: dict[str, Any], seed: int, tally: Tally, findings: list[dict[str, Any]]) -> None:
+    """Adds one seed's counts and findings to the results."""
+    result["seeds"].append(seed)
+    result["findings"] += findings
+    for name, counts in tally.items():
+        total = result["by_target"].setdefault(name, {"inputs": 0, "read": 0})
+        for key, count in counts.items():
+            total[key] += count
+            result["inputs"] += count if key == "inputs" else 0
 
 
 def attempt(target: Target, data: bytes) -> str:

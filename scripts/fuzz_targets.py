@@ -45,7 +45,7 @@ class Target:
         samples: what it likes.
         read: how it is called.
         damage: how its samples are damaged.
-        share: how many inputs it gets, relative to the others.
+        share: how many inputs it gets, relative to the others; quick readers more.
     """
 
     name: str
@@ -110,7 +110,7 @@ def paper_target(folder: Path) -> Target:
     root = paper_workbooks.write_dataset(folder / "paper")
     victim = root / "Pepper2Human" / "human_P01A01T01.xlsx"
     read = replacing(victim, lambda: FORMATS["paper"].read(root))
-    return Target("motions-paper", [victim.read_bytes()], read, mixed(in_archive))
+    return Target("motions-paper", [victim.read_bytes()], read, mixed(in_archive), share=0.6)
 
 
 def pairs_targets(folder: Path, motions: syda_gym.Motions) -> list[Target]:
@@ -148,13 +148,14 @@ def mapping_targets(folder: Path) -> list[Target]:
     near = (folder / "near.safetensors").read_bytes()
     return [
         Target("mapping-weights", [weights.read_bytes(), near], replacing(weights, read), share=0.5),
-        Target("mapping-weights-marked", [near], read_marked, mixed(in_weights)),
-        Target("mapping-card", [card.read_bytes()], replacing(card, read), mixed(in_json)),
+        Target("mapping-weights-marked", [near], read_marked, mixed(in_weights), share=0.7),
+        Target("mapping-card", [card.read_bytes()], replacing(card, read), mixed(in_json), share=0.8),
         Target(
             "mapping-card-syda",
             [(folder / "syda.json").read_bytes()],
             replacing(folder / "syda.json", lambda: syda_gym.load_mapping(folder / "syda")),
             mixed(in_json),
+            share=0.7,
         ),
     ]
 
@@ -217,8 +218,8 @@ def robot_targets(folder: Path) -> list[Target]:
 
     descriptions = [asset("robots", f"{name}.yaml").read_bytes() for name in ("nao", "pepper")]
     return [
-        Target("robot-yaml", descriptions, read_description, mixed(in_yaml), share=0.6),
-        Target("robot-urdf", [asset("robots", "nao.urdf").read_bytes()], read_tree, share=0.6),
+        Target("robot-yaml", descriptions, read_description, mixed(in_yaml), share=0.3),
+        Target("robot-urdf", [asset("robots", "nao.urdf").read_bytes()], read_tree, share=0.3),
     ]
 
 
@@ -241,13 +242,14 @@ def live_targets(folder: Path) -> list[Target]:
             )
             writing.decided(tick, loop.step(tick))
     return [
-        Target("network-open", samples, PacketDecoder(body), mixed(in_json), share=3.0),
-        Target("network-token", samples, PacketDecoder(body, token="secret"), mixed(in_json), share=3.0),
+        Target("network-open", samples, PacketDecoder(body), mixed(in_json), share=6.0),
+        Target("network-token", samples, PacketDecoder(body, token="secret"), mixed(in_json), share=6.0),
         Target(
             "journal",
             [journal.read_bytes()],
             replacing(journal, lambda: replay_journal(journal, mapping)),
             mixed(in_json_lines),
+            share=0.15,
         ),
     ]
 
@@ -266,7 +268,9 @@ efficiency: {chain: adult>kid>pepper, new_body: adult, actions: [1, 2], draws: 2
 """
     place = folder / "study.yaml"
     place.write_bytes(text)
-    return Target("benchmark-yaml", [text], replacing(place, lambda: BenchmarkConfig.read(place)), mixed(in_yaml))
+    return Target(
+        "benchmark-yaml", [text], replacing(place, lambda: BenchmarkConfig.read(place)), mixed(in_yaml), share=0.6
+    )
 
 
 def replacing(path: Path, read: Callable[[], Any]) -> Callable[[bytes], Any]:

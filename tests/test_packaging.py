@@ -7,7 +7,6 @@ import os
 import subprocess
 import sys
 import tarfile
-import time
 import tomllib
 import zipfile
 from pathlib import Path
@@ -100,12 +99,10 @@ def test_import_loads_nothing_heavy() -> None:
 
 
 def test_import_takes_less_than_a_second() -> None:
-    seconds = []
-    for _ in range(3):  # the best of three, because other work may share the machine
-        start = time.perf_counter()
-        assert run("import syda_gym").returncode == 0
-        seconds.append(time.perf_counter() - start)
-    assert min(seconds) < 1.0
+    # Processor time, because other work may share the machine.
+    result = run("import time; start = time.process_time(); import syda_gym; print(time.process_time() - start)")
+    assert result.returncode == 0, result.stderr
+    assert float(result.stdout) < 1.0
 
 
 def test_every_public_name_is_there_and_a_wrong_one_is_refused() -> None:

@@ -78,18 +78,6 @@ class SelfCollision:
             )
         )
 
-    def touching_links(self, angles: FloatArray) -> tuple[tuple[str, str], ...]:
-        """Names of the links that touch at ``angles`` ``(n,)`` [rad], for messages."""
-        if not self.available:
-            return ()
-        names = [self._model.frames[shape.parentFrame].name for shape in self._shapes.geometryObjects]
-        found = {
-            (names[pair.first], names[pair.second])
-            for pair, hit in zip(self._shapes.collisionPairs, self._hits(angles), strict=True)
-            if hit
-        }
-        return tuple(sorted(found))
-
     def ignores_far_links(self) -> bool:
         """Whether a pair was left out because it touches at rest although the links are no near relatives.
 

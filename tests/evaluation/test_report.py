@@ -237,6 +237,12 @@ def test_two_hundred_chains_stay_small_and_open_fast(browser, embedded, tmp_path
     many = Report("Many", "", [], [Section("Play", [Playback("p", playback.chains)])])
     path = write_report(many, tmp_path)
     assert path.stat().st_size < 25e6
-    start = time.perf_counter()
+    browser.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})  # other work may share the machine
+    before = _processor_time(browser)
     _open(browser, path)
-    assert time.perf_counter() - start < 3.0
+    assert _processor_time(browser) - before < 3.0
+
+
+def _processor_time(browser) -> float:
+    metrics = browser.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
+    return next(entry["value"] for entry in metrics if entry["name"] == "TaskDuration")

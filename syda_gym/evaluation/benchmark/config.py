@@ -202,11 +202,6 @@ class BenchmarkConfig:
             motions, list(self.operators) or humans, list(self.robots) or robots_of(motions), self.max_hops, self.via
         )
 
-    @property
-    def reference_method(self) -> str:
-        """The method that the others are compared with."""
-        return self.baseline or self.methods[0]
-
 
 def split_method(text: str) -> tuple[str, str | None]:
     """``syda:paper`` into method and preset.
