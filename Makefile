@@ -56,7 +56,7 @@ $(BASE): pyproject.toml
 
 # Everything that tests, checks and documentation need; extras left out here are tested where they are installed.
 $(DEVELOPMENT): $(BASE)
-	$(BIN)/python -m pip install --quiet -e ".[dev,docs,train,ik,bvh,live,export]"
+	$(BIN)/python -m pip install --quiet -e ".[dev,docs,train,ik,bvh,live,naoqi,export]"
 	touch $@
 
 clean:

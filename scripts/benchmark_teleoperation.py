@@ -6,13 +6,15 @@
     python scripts/benchmark_teleoperation.py network --hours 1
     python scripts/benchmark_teleoperation.py fuzz --inputs 1000000
 
-``FOLDER`` holds ``paper``, ``kinect`` and ``bvh``. Every part prints one JSON object. Pin the process to one core, for
-example with ``taskset -c 1``.
+``FOLDER`` holds ``paper``, ``kinect`` and ``bvh``. Every part prints one JSON object, and ``--out FILE`` puts it into a
+results file beside the other parts. Pin the process to one core, for example with ``taskset -c 1``; on a busy machine
+``chrt -f 20`` gives it real-time priority.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import multiprocessing
 import os
@@ -30,6 +32,7 @@ from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
+from syda_gym.files import read_json, write_json
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.motions.clip import MotionClip
 from syda_gym.motions.loading import load_motions
@@ -53,6 +56,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path)
     parser.add_argument("--mapping", default="syda")
     parser.add_argument("--route", default="auto", help="auto, or bodies such as adult,kid,pepper")
+    parser.add_argument("--out", type=Path, help="results file, in which this part is replaced")
     args = parser.parse_args()
     parts = {
         "latency": latency,
@@ -61,7 +65,11 @@ def main() -> None:
         "network": network,
         "fuzz": fuzz,
     }
-    print(json.dumps(parts[args.part](args), indent=1))
+    result = parts[args.part](args)
+    print(json.dumps(result, indent=1))
+    if args.out is not None:
+        before = read_json(args.out) if args.out.exists() else {}
+        write_json(args.out, {**before, args.part: result})
 
 
 def chosen(args: argparse.Namespace) -> Mapping:
@@ -77,52 +85,87 @@ def operator_frames(count: int) -> FloatArray:
 
 
 def latency(args: argparse.Namespace) -> dict[str, Any]:
-    """UDP to UDP over loopback in real time, sender and receiver in processes of their own."""
+    """UDP to UDP over loopback in real time; another process is camera and robot and measures round trips."""
     mapping = chosen(args)
-    loop = TeleoperationLoop(mapping, LoopSettings(rate=args.rate, calibration=0.0))
-    stats = LiveStatistics(window=args.frames)
-    source = UdpSource(mapping.source, port=0)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
-        listener.bind(("127.0.0.1", 0))
-        with source, UdpSink(loop.robot, port=listener.getsockname()[1]) as sink:
-            sender = multiprocessing.get_context("spawn").Process(
-                target=_send, args=(source.port, operator_frames(args.frames), args.rate)
-            )
-            sender.start()
-            run(
-                source,
-                loop,
-                sink,
-                statistics=stats,
-                seconds=args.frames / args.rate + 5.0,
-                rest_at_end=False,
-            )
-            sender.join()
-    summary = stats.summary()
+    loop = TeleoperationLoop(mapping, LoopSettings(rate=args.rate))
+    standing, frames = standing_frames(args.rate), operator_frames(args.frames)
+    stats = LiveStatistics(window=args.frames)  # the standing before them is forgotten
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    with UdpSource(mapping.source, port=0) as source:
+        other = context.Process(
+            target=_camera_and_robot, args=(theirs, source.port, np.concatenate([standing, frames]), args.rate)
+        )
+        other.start()
+        with UdpSink(loop.robot, port=ours.recv()) as sink:
+            ours.send("go")
+            began, used = time.monotonic(), time.process_time()
+            seconds = (len(standing) + len(frames)) / args.rate + 1.0
+            run(source, loop, sink, statistics=stats, seconds=seconds, rest_at_end=False)
+            share = (time.process_time() - used) / (time.monotonic() - began)
+        trips = np.array(ours.recv())[len(standing) :]
+        other.join()
     return {
         "route": mapping.route,
         "method": mapping.method,
         "rate_hz": args.rate,
+        "cores": len(os.sched_getaffinity(0)),
         "load_average": os.getloadavg()[0],
         "latency_p90_ms": 1e3 * stats.percentile(90),
-        **summary,
+        "round_trip_p50_ms": 1e3 * float(np.nanpercentile(trips, 50)),
+        "round_trip_p99_ms": 1e3 * float(np.nanpercentile(trips, 99)),
+        "round_trips_missed": int(np.isnan(trips).sum()),
+        "share_of_a_core": share,
+        **stats.summary(),
     }
 
 
-def _send(port: int, frames: FloatArray, rate: float) -> None:
-    time.sleep(1.0)
-    begun = time.monotonic()
+def standing_frames(rate: float) -> FloatArray:
+    """The embedded adult standing for half a second longer than the calibration takes."""
+    body = catalog.get("adult")
+    assert isinstance(body, HumanSkeleton)
+    return np.repeat(body.standing()[None], int(2.5 * rate), axis=0)
+
+
+def _camera_and_robot(connection: Any, port: int, frames: FloatArray, rate: float) -> None:
+    """Sends frames and waits for the command after each; a round trip that took too long is NaN."""
+    # Camera and robot have their own processors; the loop keeps the one that it was given.
+    others = set(range(os.cpu_count() or 1)) - os.sched_getaffinity(0)
+    os.sched_setaffinity(0, others or os.sched_getaffinity(0))
+    trips = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.bind(("127.0.0.1", 0))
+        connection.send(sock.getsockname()[1])
+        connection.recv()
+        begun = time.monotonic()
         for index, frame in enumerate(frames):
+            packet = encode_frame(index, index / rate, frame)
             time.sleep(max(0.0, begun + index / rate - time.monotonic()))
-            sock.sendto(encode_frame(index, index / rate, frame), ("127.0.0.1", port))
+            _drain(sock)
+            sent = time.monotonic()
+            sock.sendto(packet, ("127.0.0.1", port))
+            sock.settimeout(0.9 / rate)
+            try:
+                sock.recv(65_536)
+                trips.append(time.monotonic() - sent)
+            except TimeoutError:
+                trips.append(float("nan"))
+    connection.send(trips)
+
+
+def _drain(sock: socket.socket) -> None:
+    """Throws away commands that no frame has led to."""
+    sock.setblocking(False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            sock.recv(65_536)
 
 
 def throughput(args: argparse.Namespace) -> dict[str, Any]:
     """Frames per second of the whole loop with different mappings; mink is the rival."""
     from syda_gym.mappings.fitting import fit
 
-    frames = operator_frames(600)
+    frames, standing = operator_frames(600), standing_frames(30.0)
     pair = load_motions("embedded", fps=5.0).pair("adult", "pepper")
     mappings = {
         "syda adult>pepper": choose_mapping("adult", "pepper")[0],
@@ -133,8 +176,10 @@ def throughput(args: argparse.Namespace) -> dict[str, Any]:
     result: dict[str, Any] = {"load_average": os.getloadavg()[0]}
     for name, mapping in mappings.items():
         spent = []
-        loop = TeleoperationLoop(mapping, LoopSettings(calibration=0.0))
-        for index, frame in enumerate(frames):
+        loop = TeleoperationLoop(mapping)
+        for index, frame in enumerate(standing):
+            loop.step(Tick(index / 30.0, frame, index / 30.0))
+        for index, frame in enumerate(frames, start=len(standing)):
             tick = Tick(index / 30.0, frame, index / 30.0)
             before = time.thread_time()  # of this thread alone, so that other processes do not count
             loop.step(tick)

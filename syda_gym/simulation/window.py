@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import time
@@ -14,6 +15,8 @@ from syda_gym.simulation.camera import GHOST_COLOR, MARKER_RADIUS, OPERATOR_AT, 
 from syda_gym.simulation.scene import Marker, PosedRobot, PosedSkeleton, floor_below
 
 __all__ = ["Window", "has_display"]
+
+_FOV = 60.0  # degrees; of PyBullet's viewer
 
 
 def has_display() -> bool:
@@ -59,8 +62,13 @@ class Window:
             self._operator = PosedRobot(operator, self._client, (0.0, OPERATOR_AT, 0.0))
         self._markers = [Marker(self._client, MARKER_RADIUS) for _ in robot.landmark_names] if view.error else []
         floor_below(self._client, floor)
+        shown = [robot] if self._operator is None else [robot, operator]
+        height = max(body.height for body in shown if isinstance(body, Robot | HumanSkeleton))
+        middle = (0.0, 0.0 if self._operator is None else 0.5 * OPERATOR_AT, floor + 0.56 * height)
+        # The viewer's field of view is its own; from nearer it shows what the camera does.
+        nearer = math.tan(math.radians(0.5 * view.fov)) / math.tan(math.radians(0.5 * _FOV))
         pybullet.resetDebugVisualizerCamera(
-            view.distance, 90.0 + view.yaw, -view.pitch, (0.0, 0.5 * OPERATOR_AT, 0.0), physicsClientId=self._client
+            nearer * view.distance, 90.0 + view.yaw, -view.pitch, middle, physicsClientId=self._client
         )
         self._next = time.monotonic()
 

@@ -23,6 +23,7 @@ from syda_gym.teleoperation.tick import Decision, State
 
 __all__ = ["BulletSink"]
 
+_CATCH_UP = 0.25  # s; how much simulated time may be caught up with at once
 _PICTURES = 8  # pictures that may wait for the video encoder
 
 
@@ -123,15 +124,12 @@ class BulletSink(Sink):
             raise TeleoperationError(f"the simulated robot failed: {self._failure}") from self._failure
         if decision.state is State.STOPPED:
             return
-        with self._lock:
-            self._command = decision.command
+        self._command = decision.command  # without the lock, for the loop must not wait for physics
 
     def stop(self) -> None:
         """Holds the pose that the simulated robot has now."""
         if self._thread is not None:
-            angles = self.angles()
-            with self._lock:
-                self._command = angles
+            self._command = self.angles()
 
     def close(self) -> None:
         """Ends the simulation and finishes the video."""
@@ -149,25 +147,28 @@ class BulletSink(Sink):
             self._eye = None
 
     def _run(self) -> None:
-        due = time.monotonic()
+        due, steps, most = time.monotonic(), 1, int(_CATCH_UP / self.rates.dt)
         try:
             while not self._ending.is_set():
-                with self._lock:
-                    command = self._command
-                    self._world.advance(command[None])
-                    pose = self._world.pose[0].copy()
-                self._show(command, pose)
-                due += self.rates.dt
-                wait = due - time.monotonic()
-                if wait > 0.0:
-                    self._ending.wait(wait)
-                else:
+                command = self._command
+                for _ in range(steps):
+                    with self._lock:
+                        self._world.advance(command[None])
+                        pose = self._world.pose[0].copy()
+                self._show(command, pose, steps)
+                due += steps * self.rates.dt
+                behind = time.monotonic() - due
+                steps = 1
+                if behind <= 0.0:
+                    self._ending.wait(-behind)
+                else:  # simulated time keeps up with real time, if need be with fewer pictures
                     self.late += 1
-                    due = time.monotonic()
+                    steps += min(int(behind / self.rates.dt), most)
+                    due = max(due, time.monotonic() - steps * self.rates.dt)
         except Exception as error:  # told to the loop by the next send
             self._failure = error
 
-    def _show(self, command: FloatArray, pose: FloatArray) -> None:
+    def _show(self, command: FloatArray, pose: FloatArray, steps: int) -> None:
         if self._eye is None:
             return
         n = self.robot.n_features
@@ -176,7 +177,9 @@ class BulletSink(Sink):
         if self.window:
             self._eye.show(angles, reference=command, operator=np.zeros(0), errors=errors)
         else:
-            self._pictures.put(self._eye.picture(angles, reference=command, errors=errors))
+            picture = self._eye.picture(angles, reference=command, errors=errors)
+            for _ in range(steps):  # so that the film lasts as long as what it shows
+                self._pictures.put(picture)
 
     def _write(self) -> None:
         from syda_gym.simulation.video import write_video

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
@@ -64,8 +65,8 @@ class Calibration:
             turn = _about_vertical(-self.yaw) @ AXES[self.axes]
             matrix = (self.body.axes.T @ turn).T * (self.scale * _UNITS[self.unit])
             standing = self.body.standing().reshape(-1, 3)
-            object.__setattr__(self, "_matrix", np.ascontiguousarray(matrix))
-            object.__setattr__(self, "_middle", standing[::3].mean(axis=0))
+            object.__setattr__(self, "_matrix", matrix.tolist())
+            object.__setattr__(self, "_middle", standing[::3].mean(axis=0).tolist())
 
     def apply(self, frame: FloatArray) -> FloatArray:
         """One frame ``(F,)`` of the source as a frame ``(F,)`` of ``body``.
@@ -75,27 +76,33 @@ class Calibration:
         """
         if not isinstance(self.body, HumanSkeleton):
             return frame
-        points = frame.reshape(-1, 3)
-        shoulders = points[::3]
-        middle = 0.5 * (shoulders[0] + shoulders[1]) if len(shoulders) == 2 else shoulders[0]
-        result: FloatArray = (points - middle) @ self._matrix  # type: ignore[attr-defined]
-        result += self._middle  # type: ignore[attr-defined]
-        return result.ravel()
+        # Plain floats: for six points numpy would spend its time on calling.
+        values = frame.tolist()
+        (ax, ay, az), (bx, by, bz) = values[0:3], values[9:12] if len(values) == 18 else values[0:3]
+        mx, my, mz = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz)
+        (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = self._matrix  # type: ignore[attr-defined]
+        px, py, pz = self._middle  # type: ignore[attr-defined]
+        result: list[float] = []
+        for at in range(0, len(values), 3):
+            x, y, z = values[at] - mx, values[at + 1] - my, values[at + 2] - mz
+            result += (x * xx + y * yx + z * zx + px, x * xy + y * yy + z * zy + py, x * xz + y * yz + z * zz + pz)
+        return np.array(result)
 
     def implausible(self, frame: FloatArray) -> str:
         """Empty, or which limb of the frame ``(F,)`` has a length that the calibrated person does not have."""
         if not len(self.lengths):
             return ""
-        points = frame.reshape(-1, 3, 3)
-        steps = points[:, 1:] - points[:, :-1]
-        ratio = np.sqrt(np.einsum("abc,abc->ab", steps, steps)) / self.lengths
-        if float(ratio.min()) >= _PLAUSIBLE[0] and float(ratio.max()) <= _PLAUSIBLE[1]:
-            return ""
-        arm, limb = np.unravel_index(int(np.argmax(np.abs(np.log(ratio + 1e-9)))), ratio.shape)
-        return (
-            f"{self.body.sides[int(arm)]} {('upper arm', 'forearm')[int(limb)]} is {float(ratio[arm, limb]):.2f} times "
-            "its calibrated length"
-        )
+        values = frame.tolist()
+        points = [values[at : at + 3] for at in range(0, len(values), 3)]
+        for arm, (upper, fore) in enumerate(self.lengths.tolist()):
+            shoulder, elbow, wrist = points[3 * arm : 3 * arm + 3]
+            for name, ratio in (
+                ("upper arm", math.dist(shoulder, elbow) / upper),
+                ("forearm", math.dist(elbow, wrist) / fore),
+            ):
+                if not _PLAUSIBLE[0] <= ratio <= _PLAUSIBLE[1]:
+                    return f"{self.body.sides[arm]} {name} is {ratio:.2f} times its calibrated length"
+        return ""
 
     def summary(self) -> dict[str, Any]:
         """Numbers for the screen and the journal."""

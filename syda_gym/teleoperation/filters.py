@@ -36,13 +36,14 @@ class OneEuroFilter:
         self.minimum = minimum
         self.beta = beta
         self.speed_cutoff = speed_cutoff
-        self._value: FloatArray | None = None
-        self._speed: FloatArray | None = None
+        # Plain floats: for a handful of joints numpy would spend its time on calling.
+        self._values: list[float] | None = None
+        self._speeds: list[float] = []
 
     def reset(self, value: FloatArray | None = None) -> None:
         """Forgets the past; a given ``value`` ``(n,)`` becomes the present."""
-        self._value = None if value is None else value.copy()
-        self._speed = None if value is None else np.zeros_like(value)
+        self._values = None if value is None else value.tolist()
+        self._speeds = [] if value is None else [0.0] * len(value)
 
     def __call__(self, value: FloatArray, dt: float) -> FloatArray:
         """The smoothed value.
@@ -52,23 +53,22 @@ class OneEuroFilter:
             dt: time since the last value [s]; not positive means that the value replaces nothing.
 
         Returns:
-            ``(n,)``; the filter's own array, valid until the next call.
+            ``(n,)``.
         """
-        if self._value is None or self._speed is None:
+        if self._values is None:
             self.reset(value)
-            assert self._value is not None  # set by reset; for the type checker
-            return self._value
-        if dt <= 0.0:
-            return self._value
-        change = value - self._value
-        self._speed += _share(self.speed_cutoff, dt) * (change / dt - self._speed)
-        cutoff = np.abs(self._speed)
-        cutoff *= self.beta
-        cutoff += self.minimum
-        cutoff *= 2.0 * math.pi * dt
-        change *= cutoff / (1.0 + cutoff)
-        self._value += change
-        return self._value
+            return value.copy()
+        if dt > 0.0:
+            share, turn = _share(self.speed_cutoff, dt), 2.0 * math.pi * dt
+            values, speeds = [], []  # new lists, so that a copy of the filter is one
+            for new, old, speed in zip(value.tolist(), self._values, self._speeds, strict=True):
+                change = new - old
+                speed += share * (change / dt - speed)
+                cutoff = turn * (self.minimum + self.beta * abs(speed))
+                speeds.append(speed)
+                values.append(old + change * cutoff / (1.0 + cutoff))
+            self._values, self._speeds = values, speeds
+        return np.array(self._values)
 
 
 def _share(cutoff: float, dt: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -57,6 +58,7 @@ class GuardedMapping:
         self._count = 0
         self._unfamiliar = False
         self._gains = [_gain(link) for link in self.links]
+        self._bounds = [_constant_bound(link) for link in self.links]
         try:
             self(_usual(mapping.source))
         except (SydaError, ArithmeticError, ValueError) as error:
@@ -72,28 +74,26 @@ class GuardedMapping:
         # Familiarity changes slowly; a look at every third frame is enough and saves time.
         look = self._familiar and self._count % _EVERY == 0
         self._count += 1
-        current, bound, unfamiliar = frame, 0.0, False
-        for link, gain in zip(self.links, self._gains, strict=True):
-            if self.bounded:
-                bound = bound * gain + float(link.error_bound(current)[0])
-            current, odd = self._through(link, current, look)
-            unfamiliar = unfamiliar or odd
+        mapped = self.walk(frame, look)
         if look:
-            self._unfamiliar = unfamiliar
-        if not np.isfinite(current).all():
-            raise TeleoperationError(f"{self.mapping!r} gave joint angles that are not finite")
-        return Mapped(current, bound if self.bounded else float("nan"), self._unfamiliar)
+            self._unfamiliar = mapped.unfamiliar
+        return mapped._replace(unfamiliar=self._unfamiliar)
 
-    def _through(self, link: Mapping, frame: FloatArray, look: bool) -> tuple[FloatArray, bool]:
-        """One link's image of a frame and whether the frame was unfamiliar to it."""
-        if isinstance(link, CodedMapping) and link.confidence is not None:
-            # Image and familiarity rest on the same code; asking for each would encode the frame twice.
-            codes = link.source_coder.encode(frame[None])
-            image = link.target_coder.decode(link.regressor(codes))[0]
-            if isinstance(link.target, Robot) and link.target is not self.robot:
-                image = link.target.clamp(image)[0]  # the last robot's limits are the limiter's business
-            return image, look and bool(link.confidence.unfamiliar(codes)[0])
-        return link(frame), look and bool(link.unfamiliar(frame)[0])
+    def walk(self, frame: FloatArray, look: bool) -> Mapped:
+        """The same without regard to frames before: familiarity is told only of those at which one looks.
+
+        Raises:
+            SydaError: whatever the mapping raises on a frame that it cannot take.
+        """
+        current, bound, unfamiliar = frame, 0.0, False
+        for link, gain, constant in zip(self.links, self._gains, self._bounds, strict=True):
+            if self.bounded:
+                bound = bound * gain + (float(link.error_bound(current)[0]) if constant is None else constant)
+            unfamiliar = unfamiliar or (look and bool(link.unfamiliar(current)[0]))
+            current = link(current)
+        if not math.isfinite(sum(current.tolist())):
+            raise TeleoperationError(f"{self.mapping!r} gave joint angles that are not finite")
+        return Mapped(current, bound if self.bounded else float("nan"), unfamiliar)
 
     def _knows(self, question: str, notice: str) -> bool:
         """Whether every link answers; links that were fitted on too little, or not fitted at all, do not."""
@@ -122,3 +122,8 @@ def _gain(link: Mapping) -> float:
     """How much a link enlarges a displacement that enters it."""
     confidence = getattr(link, "confidence", None)
     return float(confidence.gain) if confidence is not None else 1.0
+
+
+def _constant_bound(link: Mapping) -> float | None:
+    """The bound of a link that has one and the same for every frame; ``None`` where the frame must be asked."""
+    return link.confidence.bound if isinstance(link, CodedMapping) and link.confidence is not None else None

@@ -46,7 +46,7 @@ class WayHome:
 
     def remember(self, command: FloatArray) -> None:
         """Notes a command that was sent while following."""
-        if self._check is not None and (not self._trail or (self._trail[-1] != command).any()):
+        if self._check is not None and (not self._trail or self._trail[-1].tobytes() != command.tobytes()):
             self._trail.append(command)
 
     def begin(self, command: FloatArray, now: float) -> None:

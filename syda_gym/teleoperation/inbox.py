@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
+from collections.abc import Callable
 from typing import NamedTuple
 
 from syda_gym.teleoperation.packets import Packet
@@ -30,11 +31,15 @@ class Received(NamedTuple):
 class Inbox:
     """Holds one frame, the newest, and every request in order.
 
+    Args:
+        rouse: called after a request or the end came, to wake a source that waits for something else than the inbox.
+
     Attributes:
         dropped: how many packets were dropped, by reason; a frame that a newer one replaced counts as ``overtaken``.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, rouse: Callable[[], None] | None = None) -> None:
+        self._rouse = rouse
         self.dropped: Counter[str] = Counter()
         self._lock = threading.Lock()
         self._condition = threading.Condition(self._lock)
@@ -61,6 +66,8 @@ class Inbox:
         with self._condition:
             self._request(control)
             self._condition.notify()
+        if self._rouse is not None:
+            self._rouse()
 
     def drop(self, reason: str) -> None:
         """Counts a packet that was dropped."""
@@ -95,6 +102,13 @@ class Inbox:
             self._closed = True
             self._condition.notify_all()
             self._room.notify_all()
+        if self._rouse is not None:
+            self._rouse()
+
+    @property
+    def filled(self) -> bool:
+        """Whether there is something to take."""
+        return self._packet is not None or bool(self._controls)
 
     @property
     def closed(self) -> bool:

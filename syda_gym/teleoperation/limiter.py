@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,7 +49,7 @@ class CommandLimiter:
             for row in robot.description.coupled_limits
             if row.joint in names and row.by in names
         )
-        self._step = np.empty(len(names))
+        self._range = self.lower.tolist(), self.upper.tolist()
 
     def start(self, angles: FloatArray) -> FloatArray:
         """The allowed command nearest to ``angles`` ``(n,)`` [rad]; where a run begins."""
@@ -66,22 +67,23 @@ class CommandLimiter:
         Returns:
             A new array ``(n,)`` [rad].
         """
-        step = np.multiply(self.speed, max(dt, 0.0) * min(max(factor, 0.0), 1.0) * _ROUNDING, out=self._step)
-        result = wanted - previous
-        np.clip(result, -step, step, out=result)
-        result += previous
-        np.clip(result, self.lower, self.upper, out=result)
+        time = max(dt, 0.0) * min(max(factor, 0.0), 1.0) * _ROUNDING
+        # Plain floats: for a handful of joints numpy would spend its time on calling.
+        before, steps, result = previous.tolist(), (self.speed * time).tolist(), []
+        for start, goal, step, low, high in zip(before, wanted.tolist(), steps, *self._range, strict=True):
+            value = start + min(max(goal - start, -step), step)
+            result.append(min(max(value, low), high))
         if self._coupled:
             for row in self._coupled:
-                row.apply(previous, result, step)
+                row.apply(before, result, steps[row.joint])
             if not all(row.holds(result) for row in self._coupled):  # couplings that depend on each other
-                result[:] = previous
-        return result
+                result = before
+        return np.array(result)
 
     def allows(self, angles: FloatArray) -> bool:
         """Whether ``angles`` ``(n,)`` [rad] lie within all limits."""
         inside = bool(((angles >= self.lower) & (angles <= self.upper)).all())
-        return inside and all(row.holds(angles) for row in self._coupled)
+        return inside and all(row.holds(angles.tolist()) for row in self._coupled)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,18 +98,23 @@ class _Coupled:
         """Lower and upper limit of the joint at an angle of its governor."""
         return coupled_range(governor, self.row.at, self.row.lower, self.row.upper)
 
-    def holds(self, q: FloatArray) -> bool:
-        low, high = self.range(float(q[self.by]))
-        return low - 1e-12 <= float(q[self.joint]) <= high + 1e-12
+    def holds(self, q: Sequence[float]) -> bool:
+        low, high = self.range(q[self.by])
+        return low - 1e-12 <= q[self.joint] <= high + 1e-12
 
-    def apply(self, previous: FloatArray, q: FloatArray, step: FloatArray) -> None:
-        """Moves the joint into its range; if it is too slow for that, holds the governor back."""
-        value, governor = float(q[self.joint]), float(q[self.by])
-        before, slack = float(previous[self.joint]), float(step[self.joint])
+    def apply(self, previous: Sequence[float], q: list[float], slack: float) -> None:
+        """Moves the joint into its range; if it is too slow for that, holds the governor back.
+
+        Args:
+            previous: the last command.
+            q: the next one, changed in place.
+            slack: how far the joint may move.
+        """
+        value, governor, before = q[self.joint], q[self.by], previous[self.joint]
         low, high = self.range(governor)
         inside = min(max(value, low), high)
         if abs(inside - before) > slack:
-            start = float(previous[self.by])
+            start = previous[self.by]
             share, width = 0.0, 1.0
             for _ in range(_HALVINGS):
                 width *= 0.5
@@ -115,6 +122,6 @@ class _Coupled:
                 if abs(min(max(value, low), high) - before) <= slack:
                     share += width
             q[self.by] = start + share * (governor - start)
-            low, high = self.range(float(q[self.by]))
+            low, high = self.range(q[self.by])
             inside = min(max(value, low), high)
         q[self.joint] = inside

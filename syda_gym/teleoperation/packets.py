@@ -23,6 +23,7 @@ MAX_BYTES = 16_384
 
 _MAX_SEQUENCE = 2**53
 _MAX_VALUE = 1e6
+_NUMBERS = frozenset({int, float})
 _KEYS = frozenset({"v", "seq", "t", "token", "frame", "joints", "confidence", "control"})
 
 
@@ -102,7 +103,8 @@ class PacketDecoder:
                 )
             return Packet(sequence, sent, control=control)
         numbers = self._named(value["joints"]) if "joints" in value else value["frame"]
-        return Packet(sequence, sent, self._frame(numbers), _tracking(value.get("confidence", 1.0)))
+        tracking = _tracking(value["confidence"]) if "confidence" in value else 1.0
+        return Packet(sequence, sent, self._frame(numbers), tracking)
 
     def _check_token(self, value: dict[str, Any]) -> None:
         if self._token is None:
@@ -135,10 +137,10 @@ class PacketDecoder:
         if not isinstance(numbers, list) or len(numbers) != self.body.n_features:
             count = len(numbers) if isinstance(numbers, list) else type(numbers).__name__
             raise PacketError("shape", f"a frame of {self.body.name!r} has {self.body.n_features} numbers, got {count}")
-        for index, number in enumerate(numbers):
-            if not _is_number(number) or not abs(number) <= _MAX_VALUE:
-                name = self.body.features[index].name
-                raise PacketError("value", f"feature {name!r} must be a finite number up to {_MAX_VALUE:g}")
+        if not (_NUMBERS.issuperset(map(type, numbers)) and -_MAX_VALUE <= min(numbers) <= max(numbers) <= _MAX_VALUE):
+            wrong = next(i for i, n in enumerate(numbers) if not (_is_number(n) and abs(n) <= _MAX_VALUE))
+            name = self.body.features[wrong].name
+            raise PacketError("value", f"feature {name!r} must be a finite number up to {_MAX_VALUE:g}")
         return np.array(numbers, dtype=np.float64)
 
 
@@ -168,16 +170,16 @@ def _parse(data: bytes | str) -> dict[str, Any]:
         raise PacketError("oversized", f"packet of {len(data)} bytes; up to {MAX_BYTES} are read")
     try:
         text = data if isinstance(data, str) else data.decode("utf-8")
-        value = json.loads(text, parse_constant=_no_constant)
+        value = _JSON.decode(text)
     except PacketError:
         raise
     except (ValueError, RecursionError) as error:
         raise PacketError("json", f"not JSON: {str(error)[:100]}") from error
     if not isinstance(value, dict):
         raise PacketError("json", f"expected a JSON object, got {type(value).__name__}")
-    for key in value:
-        if key not in _KEYS:
-            raise PacketError("key", f"unknown key {key[:40]!r}; {nearest_name(key[:40], _KEYS)}")
+    if not _KEYS.issuperset(value):
+        key = next(key for key in value if key not in _KEYS)[:40]
+        raise PacketError("key", f"unknown key {key!r}; {nearest_name(key, _KEYS)}")
     if value.get("v") != VERSION:
         raise PacketError("version", f"expected version v = {VERSION}, got {str(value.get('v'))[:40]}")
     return value
@@ -185,6 +187,9 @@ def _parse(data: bytes | str) -> dict[str, Any]:
 
 def _no_constant(name: str) -> float:
     raise PacketError("value", f"{name} is not allowed; leave out frames that are not complete")
+
+
+_JSON = json.JSONDecoder(parse_constant=_no_constant)  # made once; ``json.loads`` would make one per packet
 
 
 def _header(value: dict[str, Any]) -> tuple[int, float]:

@@ -146,7 +146,7 @@ class _Stage:
         stream = FrameClock()
         end = self.source.clock() + self.options.patience
         while self.calibration is None:
-            received = self.source.inbox.take(0.1)
+            received = self.source.take(0.1)
             if received.packet is not None and received.packet.frame is not None:
                 stream.advance(received.arrived, received.packet.sent)
                 self.calibration = calibrator.add(stream.time, received.packet.frame)
@@ -185,7 +185,7 @@ class _Stage:
     def _listen(self, until: float, track: _Track | None) -> None:
         """Takes what arrives until the next command is due."""
         while (left := until - self.source.clock()) > 0.0:
-            received = self.source.inbox.take(left)
+            received = self.source.take(left)
             if received.packet is None or received.packet.frame is None or self.calibration is None:
                 if self.source.inbox.closed:
                     return

@@ -6,6 +6,7 @@ import gc
 import time
 from collections.abc import Callable
 
+from syda_gym.teleoperation.anticipation import Anticipation
 from syda_gym.teleoperation.inbox import Received
 from syda_gym.teleoperation.journal import Journal
 from syda_gym.teleoperation.loop import TeleoperationLoop
@@ -16,6 +17,7 @@ from syda_gym.teleoperation.tick import Decision, State, Tick
 
 __all__ = ["run"]
 
+_GRACE = 1.5  # periods to wait for the frame after a frame
 _HOMEWARD = 90.0  # s; the longest way to rest at the end of a run; slow joints and detours take their time
 
 
@@ -32,9 +34,9 @@ def run(
 ) -> LiveStatistics:
     """Runs until the source ends, the time is over, or a KeyboardInterrupt; then eases to rest.
 
-    A frame is acted on when it arrives; while none arrives the loop decides ``settings.rate`` times a second all the
-    same. The source and the sink must be started and open, the sink first (it may take a second, in
-    which a recording would already play); the source's clock is the loop's.
+    A frame is acted on when it arrives. While none arrives the loop decides ``settings.rate`` times a second all the
+    same, for the first time one and a half periods after a frame. The source and the sink must be started and open, the
+    sink first, which may take a second; the source's clock is the loop's.
 
     Args:
         source: where frames come from.
@@ -51,13 +53,18 @@ def run(
     """
     stats = statistics or LiveStatistics()
     driver = _Driver(source, loop, sink, journal, stats, on_decision)
+    frames = Anticipation(source, driver.rehearse)
     # What exists now stays; the collector need not look at it again in the middle of a frame.
     gc.collect()
     gc.freeze()
     try:
         end = None if seconds is None else source.clock() + seconds
+        patience = period = 1.0 / loop.settings.rate
         while end is None or source.clock() < end:
-            driver.step(source.inbox.take(1.0 / loop.settings.rate))
+            received = frames.take(patience)
+            driver.step(received)
+            # A stream of the loop's own rate must not find the loop just deciding that no frame came.
+            patience = period if received.packet is None else _GRACE * period
             if source.inbox.closed:
                 break
     except KeyboardInterrupt:
@@ -116,7 +123,14 @@ class _Driver:
             self._write(self.journal, tick, decision)
         if self.on_decision is not None:
             self.on_decision(decision)
+        self.loop.settle()
         return decision
+
+    def rehearse(self) -> None:
+        """What ``step`` does with a frame, without effect."""
+        self.source.rehearse()
+        self.loop.rehearse()
+        self.sink.rehearse()
 
     def go_to_rest(self) -> None:
         """Asks for rest and keeps deciding until the robot is there; frames are left unread."""

@@ -11,11 +11,14 @@ import numpy as np
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
+from syda_gym.teleoperation.clearance import Clearance
 
 __all__ = ["SelfCollision"]
 
 _SAMPLES = 256
 _SMALL = 1e-3  # rad
+_STEP = 0.1  # rad; how far apart the tested poses of a way may be
+_FEW = 24  # pairs; looking at more of them one by one takes as long as looking at all
 _ALWAYS = 0.5  # pairs that touch in more than this share of random poses overlap by construction
 
 
@@ -49,6 +52,9 @@ class SelfCollision:
         self.why = ""
         self.pairs = 0
         self.ignored: tuple[tuple[str, str], ...] = ()
+        import pinocchio
+
+        self._pin: Any = pinocchio
         try:
             self._model, self._shapes = _arm_model(robot)
         except (ValueError, RuntimeError) as error:  # meshes that are missing or broken
@@ -57,6 +63,7 @@ class SelfCollision:
             self._index, self._turns = _indices(self._model, robot)
             self._configuration = np.zeros(self._model.nq)
             self._choose_pairs()
+            self._clearance = Clearance(robot, self._model, self._shapes, margin)
             self.pairs = len(self._shapes.collisionPairs)
             if not self.pairs:
                 self.why = f"self-collision is not checked: {robot.urdf.name} has no collision shapes on two links"
@@ -68,15 +75,15 @@ class SelfCollision:
 
     def touches(self, angles: FloatArray) -> bool:
         """Whether any pair of links is nearer than the margin at ``angles`` ``(n,)`` [rad]."""
-        import pinocchio
-
         if not self.available:
             return False
-        return bool(
-            pinocchio.computeCollisions(
-                self._model, self._data, self._shapes, self._shape_data, self._full(angles), True
-            )
-        )
+        return self._touches(angles, self._clearance.suspects(angles))
+
+    def measure(self, angles: FloatArray) -> None:
+        """Measures all distances at ``angles`` ``(n,)`` [rad], where that helps: checks near there become cheap."""
+        if self.available and self._clearance.wants(angles):
+            self._pin.computeDistances(self._model, self._data, self._shapes, self._shape_data, self._full(angles))
+            self._clearance.note(angles, [result.min_distance for result in self._shape_data.distanceResults])
 
     def ignores_far_links(self) -> bool:
         """Whether a pair was left out because it touches at rest although the links are no near relatives.
@@ -103,15 +110,9 @@ class SelfCollision:
             second, count = parents[second], count + 1
         return above[second] + count
 
-    def free_path(self, start: FloatArray, end: FloatArray, step: float = 0.1) -> bool:
-        """Whether the straight way from ``start`` (known to be free) to ``end`` is free, tested every ``step`` rad."""
-        if not self.available:
-            return True
-        farthest = float(np.abs(end - start).max())
-        if farthest <= step:
-            return not self.touches(end)
-        count = math.ceil(farthest / step)
-        return not any(self.touches(start + (end - start) * (i / count)) for i in range(count, 0, -1))
+    def free_path(self, start: FloatArray, end: FloatArray) -> bool:
+        """Whether the straight way from ``start`` (known to be free) to ``end`` is free, tested every 0.1 rad."""
+        return not self.available or self._is_free(start, end, self._clearance.suspects(start, end))
 
     def allowed(self, start: FloatArray, end: FloatArray) -> FloatArray:
         """The part of a step that stays free: all of it, or arm by arm and joint by joint what can still move.
@@ -125,26 +126,49 @@ class SelfCollision:
         Returns:
             ``end`` itself, or a new array between ``start`` and ``end``.
         """
-        if self.free_path(start, end):
+        if not self.available:
+            return end
+        suspects = self._clearance.suspects(start, end)
+        if self._is_free(start, end, suspects):
             return end
         result = start.copy()
         for part in self.robot.arm_slices:
-            if self._try(result, end, part):
+            if self._try(result, end, part, suspects):
                 continue
             for joint in range(part.start, part.stop):
-                self._try(result, end, slice(joint, joint + 1))
+                self._try(result, end, slice(joint, joint + 1), suspects)
         return result
 
-    def _try(self, pose: FloatArray, end: FloatArray, part: slice) -> bool:
+    def _try(self, pose: FloatArray, end: FloatArray, part: slice, suspects: list[int] | None) -> bool:
         """Moves part of a pose to ``end`` if the way is free; steps too small to matter are not worth a check."""
         if float(np.abs(end[part] - pose[part]).max()) < _SMALL:
             return True
         moved = pose.copy()
         moved[part] = end[part]
-        if not self.free_path(pose, moved):
+        if not self._is_free(pose, moved, suspects):
             return False
         pose[part] = end[part]
         return True
+
+    def _is_free(self, start: FloatArray, end: FloatArray, suspects: list[int] | None) -> bool:
+        """As ``free_path``, looking at the suspected pairs only, at all if there is no telling."""
+        if suspects == []:
+            return True
+        farthest = float(np.abs(end - start).max())
+        if farthest <= _STEP:
+            return not self._touches(end, suspects)
+        count = math.ceil(farthest / _STEP)
+        return not any(self._touches(start + (end - start) * (i / count), suspects) for i in range(count, 0, -1))
+
+    def _touches(self, angles: FloatArray, suspects: list[int] | None) -> bool:
+        everything = self._model, self._data, self._shapes, self._shape_data, self._full(angles)
+        if suspects is None or len(suspects) > _FEW:
+            return bool(self._pin.computeCollisions(*everything, True))
+        if not suspects:
+            return False
+        self._pin.updateGeometryPlacements(*everything)
+        look = self._pin.computeCollision
+        return any(look(self._shapes, self._shape_data, pair) for pair in suspects)
 
     def _full(self, angles: FloatArray) -> FloatArray:
         self._configuration[self._index] = angles
@@ -154,9 +178,7 @@ class SelfCollision:
         return self._configuration
 
     def _hits(self, angles: FloatArray) -> list[bool]:
-        import pinocchio
-
-        pinocchio.computeCollisions(self._model, self._data, self._shapes, self._shape_data, self._full(angles), False)
+        self._pin.computeCollisions(self._model, self._data, self._shapes, self._shape_data, self._full(angles), False)
         return [result.isCollision() for result in self._shape_data.collisionResults]
 
     def _choose_pairs(self) -> None:
@@ -226,16 +248,14 @@ class SelfCollision:
 
     def _keep(self, chosen: list[bool], order: list[int] | None = None) -> None:
         """Keeps only the chosen pairs of shapes, perhaps in another order, and renews what depends on them."""
-        import pinocchio
-
         # Indices first: the list's elements are references into a vector that changes under removal.
         pairs = [(pair.first, pair.second) for pair in self._shapes.collisionPairs]
         self._shapes.removeAllCollisionPairs()
         for index in range(len(pairs)) if order is None else order:
             if chosen[index]:
-                self._shapes.addCollisionPair(pinocchio.CollisionPair(*pairs[index]))
-        self._data = pinocchio.Data(self._model)
-        self._shape_data = pinocchio.GeometryData(self._shapes)
+                self._shapes.addCollisionPair(self._pin.CollisionPair(*pairs[index]))
+        self._data = self._pin.Data(self._model)
+        self._shape_data = self._pin.GeometryData(self._shapes)
         for request in self._shape_data.collisionRequests:
             request.security_margin = self.margin
 

@@ -5,38 +5,43 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import math
+import select
 import socket
 import threading
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
 from typing import Any
 
 from syda_gym.embodiments.embodiment import Embodiment
 from syda_gym.errors import MissingExtraError, OptionError, TeleoperationError
 from syda_gym.motions.clip import MotionClip
-from syda_gym.teleoperation.inbox import Inbox
+from syda_gym.teleoperation.inbox import Inbox, Received
 from syda_gym.teleoperation.ordering import STREAM_REASONS, Ordering
 from syda_gym.teleoperation.packets import MAX_BYTES, Packet, PacketDecoder, PacketError
 
 __all__ = ["ReplaySource", "Source", "UdpSource", "WebSocketSource", "is_loopback", "require_token"]
 
 _POLL = 0.2  # s; how often a receiving thread looks whether it should end
+_BURST = 64  # packets that are read at once before the loop gets its turn
 
 
-class Source(ABC):
-    """Delivers frames of one body into an inbox from a thread of its own.
+class Source:
+    """Delivers frames of one body into an inbox, from a thread of its own unless it can do without.
 
     Attributes:
-        inbox: where the loop takes them from.
+        inbox: what came and was not taken yet.
         body: whose frames they are.
+        threaded: whether frames come through a thread of this process.
     """
+
+    threaded = True
 
     def __init__(self, body: Embodiment, clock: Callable[[], float] = time.monotonic) -> None:
         self.body = body
         self.inbox = Inbox()
         self.clock = clock
         self._ending = threading.Event()
+        self._started = False
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
@@ -45,11 +50,18 @@ class Source(ABC):
         Raises:
             TeleoperationError: started twice, or the address cannot be used.
         """
-        if self._thread is not None:
+        if self._started:
             raise TeleoperationError(f"{type(self).__name__} was started already; make a new one")
         self._open()
-        self._thread = threading.Thread(target=self._run, name=type(self).__name__, daemon=True)
-        self._thread.start()
+        self._started = True
+        self._begin()
+
+    def take(self, timeout: float) -> Received:
+        """Waits up to ``timeout`` seconds for a frame or a request and takes it; empty-handed after that."""
+        return self.inbox.take(timeout)
+
+    def rehearse(self) -> None:
+        """Does what ``take`` does with a frame, without one, so that the next frame is read faster."""
 
     def close(self) -> None:
         """Ends the thread and frees the address."""
@@ -66,15 +78,19 @@ class Source(ABC):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _open(self) -> None:  # noqa: B027 - a recording has nothing to open
+    def _open(self) -> None:
         """Takes hold of an address; runs in the caller's thread so that errors reach the caller."""
 
-    def _shut(self) -> None:  # noqa: B027 - a recording has nothing to shut
+    def _shut(self) -> None:
         """Frees the address."""
 
-    @abstractmethod
+    def _begin(self) -> None:
+        """Starts the thread."""
+        self._thread = threading.Thread(target=self._run, name=type(self).__name__, daemon=True)
+        self._thread.start()
+
     def _run(self) -> None:
-        """Delivers until ``_ending`` is set."""
+        """Delivers until ``_ending`` is set; runs in the thread."""
 
 
 class ReplaySource(Source):
@@ -85,7 +101,7 @@ class ReplaySource(Source):
 
     Args:
         clips: of one body, played one after the other.
-        speed: 2 plays twice as fast.
+        speed: 2 plays twice as fast; the standing takes its time.
         repeat: begin again at the end.
         stand: seconds for which the first frame's body stands first, for the calibration.
         clock: of the loop.
@@ -116,7 +132,7 @@ class ReplaySource(Source):
     @property
     def seconds(self) -> float:
         """Duration of one pass [s], if the loop keeps up."""
-        return (self.stand + sum(clip.seconds for clip in self.clips)) / self.speed
+        return self.stand + sum(clip.seconds for clip in self.clips) / self.speed
 
     def _run(self) -> None:
         sequence, due, begun = 0, 0.0, -math.inf
@@ -125,13 +141,13 @@ class ReplaySource(Source):
                 if not self.inbox.wait_for_room():
                     return
                 now = self.clock()
-                if now - begun - due > period / self.speed:  # the loop was late: what is left to play moves on with it
+                if now - begun - due > period:  # the loop was late: what is left to play moves on with it
                     begun = now - due
                 elif self._ending.wait(max(0.0, begun + due - now)):
                     return
                 self.inbox.put(Packet(sequence, due, frame), self.clock())
                 sequence += 1
-                due += period / self.speed
+                due += period
             if not self.repeat:
                 break
         self._ending.wait(max(0.0, begun + due - self.clock()))
@@ -147,7 +163,7 @@ class ReplaySource(Source):
                 yield self.body.standing(), 1.0 / first.fps
         for clip in self.clips:
             for frame in clip.frames:
-                yield frame, 1.0 / clip.fps
+                yield frame, 1.0 / (clip.fps * self.speed)
 
 
 class _NetworkSource(Source):
@@ -182,6 +198,8 @@ class _NetworkSource(Source):
 class UdpSource(_NetworkSource):
     """Listens for packets on UDP; see ``packets.PacketDecoder`` for what they hold.
 
+    Whoever takes a frame reads the socket; a thread in between would cost a handover per frame.
+
     Args:
         body: whose frames arrive.
         host: address to listen on; anything but loopback needs a token.
@@ -193,6 +211,8 @@ class UdpSource(_NetworkSource):
         OptionError: an address beyond loopback without a token, or a port that is none.
     """
 
+    threaded = False
+
     def __init__(
         self,
         body: Embodiment,
@@ -202,13 +222,38 @@ class UdpSource(_NetworkSource):
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         super().__init__(body, host, port, token, clock)
+        self.inbox = Inbox(self._rouse)
         self._socket: socket.socket | None = None
+        self._bell: tuple[socket.socket, socket.socket] | None = None
+        self._ears: list[socket.socket] = []
+        self._latest = b""
+
+    def take(self, timeout: float) -> Received:
+        """Reads what has arrived, or waits for it up to ``timeout`` seconds; packets that are refused do not count."""
+        end = time.monotonic() + timeout
+        while not (self.inbox.filled or self.inbox.closed):
+            left = max(0.0, end - time.monotonic())
+            # Not epoll, which counts in whole milliseconds.
+            ready, _, _ = select.select(self._ears, (), (), left)
+            if self._socket in ready:
+                self._receive()
+            if self._bell and self._bell[0] in ready:
+                self._hear()
+            if left == 0.0:
+                break
+        return self.inbox.take(0.0)
+
+    def rehearse(self) -> None:
+        """Decodes the last packet again."""
+        if self._latest:
+            with contextlib.suppress(PacketError):
+                self._decoder(self._latest)
 
     def _open(self) -> None:
         try:
             family, kind, protocol, _, address = socket.getaddrinfo(self.host, self.port, type=socket.SOCK_DGRAM)[0]
             self._socket = socket.socket(family, kind, protocol)
-            self._socket.settimeout(_POLL)
+            self._socket.setblocking(False)
             self._socket.bind(address)
         except OSError as error:
             if self._socket is not None:
@@ -218,24 +263,39 @@ class UdpSource(_NetworkSource):
                 "choose another address or port"
             ) from error
         self.port = int(self._socket.getsockname()[1])
+        self._bell = socket.socketpair()
+        for end in self._bell:
+            end.setblocking(False)
+        self._ears = [self._socket, self._bell[0]]
+
+    def _begin(self) -> None:
+        """No thread: ``take`` reads."""
 
     def _shut(self) -> None:
-        if self._socket is not None and self._thread is None:
-            self._socket.close()
+        self.inbox.close()
+        for opened in (self._socket, *(self._bell or ())):
+            if opened is not None:
+                opened.close()
 
-    def _run(self) -> None:
+    def _receive(self) -> None:
         assert self._socket is not None  # opened by start; for the type checker
-        with self._socket:
-            while not self._ending.is_set():
-                try:
-                    data, sender = self._socket.recvfrom(MAX_BYTES + 1)
-                except TimeoutError:
-                    continue
-                except OSError:  # an ICMP error of an earlier answer, or the socket was closed
-                    if self._ending.wait(0.01):
-                        return
-                    continue
-                self._accept(data, sender)
+        for _ in range(_BURST):
+            try:
+                data, sender = self._socket.recvfrom(MAX_BYTES + 1)
+            except OSError:  # no more, or an ICMP error of an earlier answer
+                return
+            self._latest = data
+            self._accept(data, sender)
+
+    def _rouse(self) -> None:
+        if self._bell is not None:
+            with contextlib.suppress(OSError):  # ringing already, or closed
+                self._bell[1].send(b"!")
+
+    def _hear(self) -> None:
+        if self._bell is not None:
+            with contextlib.suppress(OSError):
+                self._bell[0].recv(4096)
 
 
 class WebSocketSource(_NetworkSource):

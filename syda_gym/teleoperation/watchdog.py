@@ -12,6 +12,8 @@ from syda_gym.errors import OptionError
 
 __all__ = ["Ease", "Watch", "Watchdog"]
 
+_INSTANT = 1e-6  # s
+
 
 class Watch(StrEnum):
     """The verdict of the watchdog."""
@@ -47,6 +49,10 @@ class Watchdog:
     def feed(self, now: float) -> None:
         """A good frame arrived at ``now`` [s]."""
         self._fed = now
+
+    def wake(self, now: float) -> None:
+        """The robot may move again from ``now`` [s] on: it holds until a frame comes, and eases if none does."""
+        self._fed = max(self._fed, now - self.silence - _INSTANT)
 
     def verdict(self, now: float) -> Watch:
         """What to do at ``now`` [s]."""

@@ -7,6 +7,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,7 @@ from syda_gym.teleoperation.runner import run
 from syda_gym.teleoperation.sinks import ManySinks, MemorySink, UdpSink
 from syda_gym.teleoperation.sources import ReplaySource, Source, UdpSource, WebSocketSource
 from syda_gym.teleoperation.statistics import LiveStatistics
-from syda_gym.teleoperation.tick import LoopSettings, State
+from syda_gym.teleoperation.tick import Decision, LoopSettings, State
 
 from .conftest import LimbMapping
 
@@ -181,6 +182,36 @@ def test_requests_arrive_and_a_stop_reaches_the_sink(mapping: LimbMapping, adult
         run(source, loop, sink, seconds=PATIENCE)
     assert len(stops) == 1
     assert sink.decisions[-1].state is State.STOPPED, "it stays stopped, the end of the run included"
+
+
+def test_a_request_from_this_side_wakes_a_source_that_waits_for_the_network(adult: HumanSkeleton) -> None:
+    with UdpSource(adult, port=0) as source:
+        for act, expected in ((lambda: source.inbox.request("pause"), ("pause",)), (source.inbox.close, ())):
+            timer = threading.Timer(0.05, act)
+            timer.start()
+            began = time.monotonic()
+            assert source.take(PATIENCE).controls == expected
+            assert time.monotonic() - began < PATIENCE, "it did not wait for a packet"
+            timer.join()
+        assert source.take(PATIENCE).packet is None, "closed, it waits no more"
+
+
+def test_a_command_packet_is_json(pepper: Robot, listener: socket.socket) -> None:
+    odd = replace(pepper.description, name='50 % "off"')
+    sink = UdpSink(Robot(odd), port=listener.getsockname()[1], token="a secret of 100 %")
+    command = np.linspace(-1.0, 1.0, pepper.n_features) / 3.0
+    with sink:
+        sink.rehearse()
+        for now in (0.1, 2.0):
+            sink.send(Decision(now, State.HOLDING, command))
+            sink.rehearse()
+    received = [json.loads(listener.recv(65536)) for _ in range(2)]
+    joints = dict(zip(pepper.joint_names, command.tolist(), strict=True))
+    assert received == [
+        {"v": 1, "seq": seq, "t": now, "robot": '50 % "off"', "state": "holding", "joints": joints,
+         "token": "a secret of 100 %"}
+        for seq, now in enumerate((0.1, 2.0))
+    ]  # fmt: skip
 
 
 def test_a_websocket_takes_the_same_packets_from_one_sender(adult: HumanSkeleton, wave: Wave) -> None:

@@ -146,7 +146,10 @@ def test_pause_stop_and_rest(mapping: LimbMapping, adult: HumanSkeleton, wave: W
     paused = stage.feed(wave(2.0), "pause")
     assert paused.state is State.PAUSED
     assert all((stage.feed(wave(2 + i * DT)).command == paused.command).all() for i in range(60)), "a pause has no end"
-    assert stage.feed(wave(4.0), "resume").state is State.FOLLOWING
+    waiting = stage.feed(None, "resume")
+    assert waiting.state is State.HOLDING, "nobody moves yet"
+    assert (waiting.command == paused.command).all()
+    assert stage.feed(wave(4.0)).state is State.FOLLOWING
     stopped = stage.feed(wave(4.0), "stop")
     for control in ("resume", "rest", "pause", "calibrate"):
         after = stage.feed(wave(4.0), control)

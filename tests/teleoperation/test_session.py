@@ -193,10 +193,11 @@ def test_the_command_line_runs_journals_and_checks(tmp_path: Path) -> None:
 
     journal = tmp_path / "run.jsonl"
     common = ["teleop", "--mapping", "geometric"]
-    live = ["--sink", "none", "--action", "wave_high", "--calibration", "0.5"]
+    live = ["--sink", "none", "--action", "wave_high", "--calibration", "0.5", "--speed", "3"]
     result = CliRunner().invoke(app, [*common, *live, "--journal", str(journal)])
     assert result.exit_code == 0, result.output
     assert "latency median" in result.output
+    assert "'following'" in result.output, "a fast replay is calibrated all the same"
     result = CliRunner().invoke(app, [*common, "--check-journal", str(journal)])
     assert result.exit_code == 0, result.output
     assert "are the same, bit for bit" in result.output

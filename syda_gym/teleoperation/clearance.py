@@ -1,0 +1,84 @@
+"""Clearance: how far a robot's shapes were apart, and which of them a movement since then can have brought together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.robot import Robot
+
+__all__ = ["Clearance"]
+
+_UNKNOWN = 1e9  # m/rad; a joint that does not turn brings every pair under suspicion
+_SLACK = 1e-4  # m; beyond the accuracy of measured distances
+
+
+class Clearance:
+    """Tells which pairs of shapes need a look at a pose, from their distances at another pose.
+
+    No point of a shape moves further than the sum over the joints that move it of the angle turned times the point's
+    greatest possible distance from the joint. Pairs that were further apart than that, and the margin, are still free.
+
+    Args:
+        robot: whose arm joints.
+        model: pinocchio's model of it.
+        shapes: its collision shapes and their pairs.
+        margin: distance [m] below which a pair counts as touching.
+    """
+
+    def __init__(self, robot: Robot, model: Any, shapes: Any, margin: float) -> None:
+        self._margin = margin
+        self._weights = _weights(robot, model, shapes)
+        self._pose: FloatArray | None = None
+        self._room = np.zeros(len(self._weights))
+        self._stale = True
+
+    def wants(self, pose: FloatArray) -> bool:
+        """Whether a measurement at ``pose`` ``(n,)`` [rad] would clear suspicions."""
+        return self._stale and (self._pose is None or bool((self._pose != pose).any()))
+
+    def note(self, pose: FloatArray, distances: list[float]) -> None:
+        """Distances [m] of all pairs were measured at ``pose`` ``(n,)`` [rad]."""
+        self._pose = pose
+        self._room = np.array(distances) - (self._margin + _SLACK)
+        self._stale = False
+
+    def suspects(self, *poses: FloatArray) -> list[int] | None:
+        """Indices of the pairs that may touch somewhere in the box of joint angles that ``poses`` ``(n,)`` [rad] span.
+
+        ``None`` before the first measurement.
+        """
+        if self._pose is None:
+            return None
+        turned = np.abs(poses[0] - self._pose)
+        for pose in poses[1:]:
+            np.maximum(turned, np.abs(pose - self._pose), out=turned)
+        found: list[int] = (self._weights @ turned >= self._room).nonzero()[0].tolist()
+        self._stale = self._stale or bool(found)
+        return found
+
+
+def _weights(robot: Robot, model: Any, shapes: Any) -> FloatArray:
+    """How far a pair can come nearer for each joint's turn ``(pairs, n)`` [m/rad]."""
+    columns = {model.getJointId(name): column for column, name in enumerate(robot.joint_names)}
+    reaches = []
+    for shape in shapes.geometryObjects:
+        shape.geometry.computeLocalAABB()
+        middle = shape.placement.act(np.array(shape.geometry.aabb_center))
+        length = float(np.linalg.norm(middle)) + float(shape.geometry.aabb_radius)
+        reach, joint = np.zeros(len(columns)), shape.parentJoint
+        while joint != 0:
+            if joint in columns:
+                turns = model.joints[joint].shortname().startswith("JointModelR")
+                reach[columns[joint]] = length if turns else _UNKNOWN
+            length += float(np.linalg.norm(model.jointPlacements[joint].translation))
+            joint = model.parents[joint]
+        reaches.append(reach)
+    rows = []
+    for pair in shapes.collisionPairs:
+        first, second = reaches[pair.first], reaches[pair.second]
+        # A joint that carries both turns them together.
+        rows.append(np.where((first > 0.0) & (second > 0.0), 0.0, first + second))
+    return np.array(rows).reshape(-1, len(columns))
