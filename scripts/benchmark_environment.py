@@ -49,12 +49,12 @@ def commands_of(env: Any, steps: int) -> list[np.ndarray]:
     return [fleet._scripts.base_of_all(np.full(fleet.count, step))[:, : fleet._n] for step in range(steps)]
 
 
-def raw_steps(env: Any, commands: list[np.ndarray]) -> float:
-    """CPU seconds in ``stepSimulation`` alone while the world of ``env`` follows the commands."""
+def raw_steps(env: Any, commands: list[np.ndarray]) -> list[float]:
+    """CPU seconds in ``stepSimulation`` alone, per control step, while the world of ``env`` follows the commands."""
     import pybullet
 
     world = env.unwrapped._fleet.world
-    substeps, clients, spent = world.rates.substeps, world._clients, 0.0
+    substeps, clients, spent = world.rates.substeps, world._clients, []
     for command in commands:
         for puppet, targets in zip(world._puppets, command.tolist(), strict=True):
             puppet.command(targets)
@@ -62,7 +62,7 @@ def raw_steps(env: Any, commands: list[np.ndarray]) -> float:
         for client in clients:
             for _ in range(substeps):
                 pybullet.stepSimulation(client)
-        spent += time.thread_time() - start
+        spent.append(time.thread_time() - start)
     return spent
 
 
@@ -77,20 +77,16 @@ def against_raw(count: int, physics_hz: float, repeats: int) -> dict[str, float]
     env.reset(seed=0)
     env.step(action)
 
-    def steps() -> None:
-        for _ in range(STEPS):
-            env.step(action)
-
     shares, raws, wholes = [], [], []
     for repeat in range(repeats):
         env.reset(seed=repeat)
         commands = commands_of(env, STEPS)
-        whole = cpu(steps)
+        whole = [cpu(lambda: env.step(action)) for _ in range(STEPS)]
         env.reset(seed=repeat)
         raw = raw_steps(env, commands)
-        shares.append(raw / whole)
-        raws.append(raw / STEPS)
-        wholes.append(whole / STEPS)
+        shares.append(statistics.median(raw) / statistics.median(whole))
+        raws += raw
+        wholes += whole
     env.close()
     return {
         "share_of_raw": statistics.median(shares),
@@ -185,26 +181,26 @@ print(json.dumps(resident() - before))
     return result
 
 
-def humanoid() -> dict[str, float] | None:
-    """Gymnasium's Humanoid-v5 against its own bare ``mj_step`` calls; ``None`` where it is not installed."""
+def humanoid() -> dict[str, float] | str:
+    """Gymnasium's Humanoid-v5 against its own bare ``mj_step`` calls; why not, where it cannot be made."""
     try:
         import mujoco
 
         env: Any = gymnasium.make("Humanoid-v5")
-    except Exception:  # not installed, or versions that do not fit each other: a peer may be left out
-        return None
+    except Exception as error:  # not installed, or versions that do not fit each other: a peer may be left out
+        return f"{type(error).__name__}: {error}".splitlines()[0]
     action = np.zeros(env.action_space.shape, dtype=np.float32)
     inner, shares, wholes, resets = env.unwrapped, [], [], []
     for repeat in range(15):
         resets.append(cpu(lambda repeat=repeat: env.reset(seed=repeat)))  # type: ignore[misc]
-        whole = cpu(lambda: [env.step(action) for _ in range(20)])
+        whole = [cpu(lambda: env.step(action)) for _ in range(20)]
         env.reset(seed=repeat)
-        raw = 0.0
+        raw = []
         for _ in range(20):
             inner.data.ctrl[:] = action
-            raw += cpu(lambda: mujoco.mj_step(inner.model, inner.data, nstep=inner.frame_skip))
-        shares.append(raw / whole)
-        wholes.append(whole / 20)
+            raw.append(cpu(lambda: mujoco.mj_step(inner.model, inner.data, nstep=inner.frame_skip)))
+        shares.append(statistics.median(raw) / statistics.median(whole))
+        wholes += whole
     env.close()
     return {
         "share_of_raw": statistics.median(shares),
@@ -213,25 +209,25 @@ def humanoid() -> dict[str, float] | None:
     }
 
 
-def panda() -> dict[str, float] | None:
-    """panda-gym's PandaReach-v3 against its own bare ``stepSimulation`` calls; ``None`` where it is not installed."""
+def panda() -> dict[str, float] | str:
+    """panda-gym's PandaReach-v3 against its own bare ``stepSimulation`` calls; why not, where it cannot be made."""
     try:
         import panda_gym  # noqa: F401
         import pybullet
 
         env: Any = gymnasium.make("PandaReach-v3")
-    except Exception:  # not installed, or versions that do not fit each other: a peer may be left out
-        return None
+    except Exception as error:  # not installed, or versions that do not fit each other: a peer may be left out
+        return f"{type(error).__name__}: {error}".splitlines()[0]
     env.reset(seed=0)
     action = np.zeros(env.action_space.shape, dtype=np.float32)
     simulation, shares, wholes, resets = env.unwrapped.sim, [], [], []
-    client = simulation.physics_client._client
+    client, substeps = simulation.physics_client._client, range(simulation.n_substeps)
     for _ in range(15):
         resets.append(cpu(env.reset))
-        whole = cpu(lambda: [env.step(action) for _ in range(20)])
-        raw = cpu(lambda: [pybullet.stepSimulation(client) for _ in range(20 * simulation.n_substeps)])
-        shares.append(raw / whole)
-        wholes.append(whole / 20)
+        whole = [cpu(lambda: env.step(action)) for _ in range(20)]
+        raw = [cpu(lambda: [pybullet.stepSimulation(client) for _ in substeps]) for _ in range(20)]
+        shares.append(statistics.median(raw) / statistics.median(whole))
+        wholes += whole
     env.close()
     return {
         "share_of_raw": statistics.median(shares),
@@ -287,11 +283,11 @@ def table(result: dict[str, Any]) -> str:
         if label in result.get("memory_mb", {}):
             rows.append((f"memory, {label.replace('_', ' ')} [MB]", f"{result['memory_mb'][label]:.1f}", bar))
     for peer, values in result["peers"].items():
-        if values:
+        if isinstance(values, dict):
             rows.append((f"{peer}: share of its raw physics", f"{values['share_of_raw']:.3f}", ""))
             rows.append((f"{peer}: reset [ms]", f"{values['reset_ms']:.3f}", ""))
         else:
-            rows.append((f"{peer}", "not installed", ""))
+            rows.append((peer, values, ""))
     lines = ["| " + " | ".join(row) + " |" for row in rows]
     return "\n".join([lines[0], "|---|---|---|", *lines[1:]])
 

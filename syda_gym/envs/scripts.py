@@ -120,20 +120,18 @@ class Scripts:
         """Chooses the robot that the methods for single rows read for."""
         self._reader = (int(self._operator_at[index]), int(self._base_at[index]), int(self._target_at[index]))
 
-    def operator_row(self, k: int) -> list[float]:
-        """Operator frame of the newest packet, ``F`` numbers."""
-        row: list[float] = self._operator_rows[self._reader[0] + k].tolist()
+    def operator_row(self, k: int) -> FloatArray:
+        """Operator frame of the newest packet, ``(F,)``."""
+        row: FloatArray = self._operator_rows[self._reader[0] + k]
         return row
 
-    def base_row(self, k: int) -> list[float]:
-        """Base commands with their preview."""
-        row: list[float] = self._base_rows[self._reader[1] + k].tolist()
-        return row
+    def base_row(self, k: int) -> FloatArray:
+        """Base commands with their preview, ``((preview + 1) n,)``; a copy that the caller may hand out."""
+        return self._base_rows[self._reader[1] + k].copy()
 
-    def target_row(self, k: int) -> list[float]:
-        """What the robot should do: joint angles and landmark coordinates."""
-        row: list[float] = self._target_rows[self._reader[2] + k].tolist()
-        return row
+    def target_row(self, k: int) -> FloatArray:
+        """What the robot should do: joint angles and landmark coordinates; a copy that the caller may hand out."""
+        return self._target_rows[self._reader[2] + k].copy()
 
     def age(self, k: int) -> float:
         """Age of the newest packet [s]."""

@@ -1,4 +1,4 @@
-"""Solo: a fleet of one whose step runs on plain numbers, because arrays of ten are slower than lists of ten.
+"""Solo: a fleet of one whose step runs on short arrays and plain numbers, without the fleet's axis of robots.
 
 Every sum is taken in the same order as in ``Fleet``, so that both give the same bits.
 """
@@ -24,7 +24,7 @@ Step = tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]
 
 
 class Solo(Fleet):
-    """One robot; ``reset`` and everything else is the fleet's.
+    """One robot; ``begin`` and ``play`` stand for ``reset``, ``step``, ``observe`` and ``info``.
 
     Args:
         options: of the environment.
@@ -32,26 +32,38 @@ class Solo(Fleet):
 
     def __init__(self, options: TeleopOptions) -> None:
         super().__init__(options, 1)
-        self._safe = list(zip(self._safe_lower.tolist(), self._safe_upper.tolist(), strict=True))
-        self._middles, self._halves = self._middle.tolist(), self._half.tolist()
+        self._safe = self._safe_lower.tolist(), self._safe_upper.tolist()
         self._low, self._high = self.layout.low, self.layout.high
-        self._corners = range(0, 3 * self._points, 3)
         weights = self._weights
-        self._sharpness = np.array([-weights.joint_sharpness, -weights.landmark_sharpness])
         self._plain = not (weights.limits or weights.contacts or weights.jitter)
         self._now, self._last, self._total = 0, 0, 0.0
-        self._base_values: list[float] = []
-        self._last_correction: list[float] = []
-        self._trail_values: tuple[list[float], ...] = ()
+        self._base_now = self._last_correction = np.zeros(self._n)
+        self._last_trail: tuple[FloatArray, ...] = ()
         self._labels: dict[str, Any] = {}
-        self._read()
 
     def begin(self, rng: np.random.Generator, wish: Any) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begins an episode; returns observation and info."""
-        self.reset([0], [rng], [wish], handed_out=False)
-        observation = self.observe()[0]
-        self._read()
-        return observation, self._first_info()
+        """Begins an episode, as ``Fleet.reset`` does it; returns observation and info."""
+        n = self._n
+        clip, k, route = self._draw(rng, wish)
+        self.clip[0], self.route[0], self._start[0] = clip, route, k
+        conditions = self._scripts.write(0, clip, k, route, rng)
+        if conditions is not None:
+            self._conditions[0] = conditions
+            self.world.set_conditions(0, conditions)
+        self._scripts.turn_to(0)
+        self._now, self._last, self._total = k, int(self._scripts.lengths[clip]), 0.0
+        self._labels = self.names(0)
+        base = self._scripts.base_row(k)[:n]
+        self._start_q[0], self._past[0] = base, base
+        state = np.array(self.world.reset_one(base.tolist()))
+        still = np.zeros(3 * self._points)
+        self._last_trail, self._last_correction = (state[n:-n].copy(), still, still), np.zeros(n)
+        observation = self._look(state, np.zeros(n) if self._residual else (base - self._middle) / self._half)
+        target = self._scripts.target_row(k)
+        error = state[:-n] - target
+        distances = _lengths(error[n:].tolist())
+        info = self._tell(k, state, target, error, distances, [0.0] * len(TERMS), 0.0, 0, base, False)
+        return observation, info
 
     def play(self, action: ArrayLike) -> Step:
         """One control step of the robot, as ``Fleet.step`` and ``Fleet.observe`` do it.
@@ -65,54 +77,37 @@ class Solo(Fleet):
         Raises:
             OptionError: wrong shape, or an action that is not finite.
         """
-        n, k, base, options = self._n, self._now, self._base_values, self.options
-        values = [-1.0 if v < -1.0 else 1.0 if v > 1.0 else v for v in self._values(action)]
-        scale = options.residual_scale
-        if self._residual:
-            correction, command = values, [b + v * scale for b, v in zip(base, values, strict=True)]
-        else:
-            command = [m + v * h for m, v, h in zip(self._middles, values, self._halves, strict=True)]
-            correction = [(c - b) / scale for b, c in zip(base, command, strict=True)]
-        hits = 0
-        for value, (low, high) in zip(command, self._safe, strict=True):
-            if value < low or value > high:
-                clipped, counts = self._limited(np.array([command]))
-                command, hits = clipped[0].tolist(), int(counts[0])
-                break
+        n, k, options = self._n, self._now, self.options
+        values = self._clipped(action)
+        correction, command, hits = self._command_of(values)
         if options.history:
-            self._remember(np.array([base]))
-        change = [a - b for a, b in zip(correction, self._last_correction, strict=True)]
+            self._remember(self._base_now[None])
         if self._journal.size:
             self._journal[0, k] = command
-        row = self.world.advance_one(command)
+        state = np.array(self.world.advance_one(command.tolist()))
         target = self._scripts.target_row(k)
-        error = [p - t for p, t in zip(row, target, strict=False)]
-        distances = self._lengths(error[n:])
-        landmarks = row[n:-n]
-        first = [a - b for a, b in zip(landmarks, self._trail_values[0], strict=True)]
-        second = [a - b for a, b in zip(first, self._trail_values[1], strict=True)]
-        third = [a - b for a, b in zip(second, self._trail_values[2], strict=True)]
-        self._trail_values = (landmarks, first, second)
-        mean = reduce(add, distances) / self._points
-        jitter = reduce(add, self._lengths(third)) / self._points
+        error = state[:-n] - target
+        flat = error.tolist()
+        distances = _lengths(flat[n:])
+        mean, jitter = reduce(add, distances) / self._points, self._jolt(state[n:-n])
+        change = (correction - self._last_correction).tolist()
         terms = self._weigh(
-            reduce(add, [e * e for e in error[:n]]), mean, reduce(add, [c * c for c in change]) / n, hits, jitter
+            reduce(add, [e * e for e in flat[:n]]), mean, reduce(add, [c * c for c in change]) / n, hits, jitter
         )
-        reward = reduce(add, terms)
         self._last_correction = correction
         self._total = self._total + mean
         self._now = k + 1
         truncated = self._now >= self._last
         terminated = options.terminate_error is not None and mean > options.terminate_error
         success = (truncated or terminated) and self._end(terminated)
-        observation = self._look(row, values)
-        info = self._describe(k, row, target, error, distances, terms, jitter, hits, command, bool(success))
-        return observation, reward, terminated, truncated, info
+        observation = self._look(state, values)
+        info = self._tell(k, state, target, error, distances, terms, jitter, hits, command, bool(success))
+        return observation, reduce(add, terms), terminated, truncated, info
 
     @property
     def present_base(self) -> FloatArray:
         """Base command of the next step ``(n,)`` [rad]."""
-        return np.array(self._base_values)
+        return self._base_now.copy()
 
     def pose(self, index: int) -> dict[str, Any]:
         """What a picture of the robot shows."""
@@ -123,23 +118,42 @@ class Solo(Fleet):
         self._sync()
         return super().__getstate__()
 
-    def _values(self, action: ArrayLike) -> list[float]:
-        array = np.asarray(action, dtype=np.float64)
-        if array.shape == (self._n,):
-            values: list[float] = array.tolist()
-            total = reduce(add, values)
-            if total - total == 0.0:
+    def _clipped(self, action: ArrayLike) -> FloatArray:
+        values = np.array(action, dtype=np.float64)
+        if values.shape == (self._n,):
+            for value in values.tolist():
+                if not -1.0 <= value <= 1.0:
+                    break
+            else:
                 return values
-        checked: list[float] = self._checked(array[None])[0].tolist()
-        return checked
+        return np.minimum(np.maximum(self._checked(values[None])[0], -1.0), 1.0)
 
-    def _lengths(self, flat: list[float]) -> list[float]:
-        return [sqrt(flat[i] * flat[i] + flat[i + 1] * flat[i + 1] + flat[i + 2] * flat[i + 2]) for i in self._corners]
+    def _command_of(self, values: FloatArray) -> tuple[FloatArray, FloatArray, int]:
+        """Correction, command within the joint limits, and how many joints had to be clipped."""
+        scale, base = self.options.residual_scale, self._base_now
+        if self._residual:
+            correction, wanted = values, base + values * scale
+        else:
+            wanted = self._middle + values * self._half
+            correction = (wanted - base) / scale
+        for value, low, high in zip(wanted.tolist(), *self._safe, strict=True):
+            if not low <= value <= high:
+                clipped, counts = self._limited(wanted[None])
+                return correction, clipped[0], int(counts[0])
+        return correction, wanted, 0
+
+    def _jolt(self, landmarks: FloatArray) -> float:
+        """Mean third difference of the landmarks."""
+        before = self._last_trail
+        first = landmarks - before[0]
+        second = first - before[1]
+        self._last_trail = (landmarks.copy(), first, second)
+        return reduce(add, _lengths((second - before[2]).tolist())) / self._points
 
     def _weigh(self, squared: float, mean: float, change: float, hits: int, jitter: float) -> list[float]:
         weights = self._weights
         # numpy's exp and math.exp may differ in the last bit.
-        near = np.exp(np.array([squared, mean]) * self._sharpness).tolist()
+        near = np.exp([squared * -weights.joint_sharpness, mean * -weights.landmark_sharpness]).tolist()
         terms = [weights.joints * near[0], weights.landmarks * near[1], -weights.correction_change * change]
         if self._plain:
             return [*terms, 0.0, 0.0, 0.0]
@@ -150,86 +164,64 @@ class Solo(Fleet):
         weights = self._weights
         return [-weights.limits * hits, -weights.contacts * contacts, -weights.jitter * jitter]
 
-    def _look(self, row: list[float], values: list[float]) -> NDArray[np.float32]:
+    def _look(self, state: FloatArray, values: FloatArray) -> NDArray[np.float32]:
         """The observation after a step; the next base command is looked up here."""
-        n, k, scripts = self._n, self._now, self._scripts
-        q = row[:n]
-        ahead = scripts.base_row(k)
-        self._base_values = base = ahead[:n]
-        errors = [b - p for b, p in zip(base, q, strict=True)]
-        for start in range(n, len(ahead), n):
-            errors += [b - p for b, p in zip(ahead[start : start + n], q, strict=True)]
-        parts = [*scripts.operator_row(k), *errors, *q, *row[-n:], *values, scripts.age(k)]
+        n, k, scripts, blocks = self._n, self._now, self._scripts, self._blocks
+        q, ahead = state[:n], scripts.base_row(k)
+        self._base_now = ahead[:n]
+        result = np.empty(self.layout.size, dtype=np.float32)
+        result[blocks["operator"]] = scripts.operator_row(k)
+        result[blocks["base_error"]] = (ahead.reshape(-1, n) - q).ravel() if self.options.preview else ahead - q
+        result[blocks["q"]] = q
+        result[blocks["qd"]] = state[-n:]
+        result[blocks["previous_action"]] = values
+        result[blocks["packet_age"].start] = scripts.age(k)
         if self.options.history:
-            parts += (self._past[0] - np.array(q)).ravel().tolist()
-        result = np.array(parts, dtype=np.float32)
+            past = (self._past[0] - q).reshape(2, -1)
+            result[blocks["base_history"]], result[blocks["q_history"]] = past[0], past[1]
         np.maximum(result, self._low, out=result)
         np.minimum(result, self._high, out=result)
         return result
 
-    def _describe(
+    def _tell(
         self,
         k: int,
-        row: list[float],
-        target: list[float],
-        error: list[float],
+        state: FloatArray,
+        target: FloatArray,
+        error: FloatArray,
         distances: list[float],
         terms: list[float],
         jitter: float,
         hits: int,
-        command: list[float],
+        command: FloatArray,
         success: bool,
     ) -> dict[str, Any]:
-        n, points, size = self._n, self._points, len(target)
-        # One array, cut into views: making an array costs more than its numbers.
-        numbers = np.array([*row, *target, *error[:n], *command, *self._base_values, *distances])
-        cuts = numbers[size + n :]
+        """The info of a step or a reset; it takes over the arrays."""
+        n, points = self._n, (self._points, 3)
         return {
             "reward_terms": dict(zip(TERMS, terms, strict=True)),
-            "joint_error": cuts[size : size + n],
-            "landmark_error": cuts[size + 3 * n :],
+            "joint_error": error[:n],
+            "landmark_error": np.array(distances),
             "jitter": jitter,
             "limit_hits": hits,
             "contacts": int(self.world.contacts[0]) if self.options.self_collision else 0,
-            "q": numbers[:n],
-            "base": cuts[size + 2 * n : size + 3 * n],
-            "command": cuts[size + n : size + 2 * n],
-            "reference": cuts[:n],
-            "landmarks": numbers[n:size].reshape(points, 3),
-            "reference_landmarks": cuts[n:size].reshape(points, 3),
+            "q": state[:n],
+            "base": self._base_now.copy(),
+            "command": command,
+            "reference": target[:n],
+            "landmarks": state[n:-n].reshape(points),
+            "reference_landmarks": target[n:].reshape(points),
             "packet_age": self._scripts.age(k),
             "frame": k,
             **self._labels,
             "is_success": success,
         }
 
-    def _first_info(self) -> dict[str, Any]:
-        info = self.info()
-        result: dict[str, Any] = {}
-        for key, value in info.items():
-            if key in self._labels:
-                result[key] = self._labels[key]
-            elif isinstance(value, dict):
-                result[key] = {name: column.item(0) for name, column in value.items()}
-            else:
-                result[key] = value.item(0) if value.ndim == 1 else value[0].copy()
-        return result
-
     def _end(self, terminated: bool) -> bool:
         frames = self._now - int(self._start[0])
         error = self._total / frames
         self._starts.learn(int(self.clip[0]), int(self._start[0]), frames, error)
         return not terminated and error <= self.options.success_error
-
-    def _read(self) -> None:
-        """Takes over from the fleet's arrays, as a reset leaves them."""
-        self._now, self._last = int(self._k[0]), int(self._length[0])
-        self._base_values = self._base[0].tolist()
-        self._last_correction = self._correction[0].tolist()
-        self._trail_values = tuple(array[0].tolist() for array in self._trail)
-        self._total = float(self._error_sum[0])
-        self._scripts.turn_to(0)
-        self._labels = self.names(0)
 
     def _sync(self) -> None:
         """Brings the fleet's arrays up to date, for pictures and pickles."""
@@ -241,3 +233,9 @@ class Solo(Fleet):
         points = self._error[:, self._n :].reshape(1, -1, 3)
         self._distances = np.zeros((1, 2 * self._points))
         self._distances[0, : self._points] = np.sqrt((points * points).sum(axis=2))[0]
+
+
+def _lengths(flat: list[float]) -> list[float]:
+    """Lengths of vectors that are listed coordinate by coordinate."""
+    numbers = iter(flat)
+    return [sqrt(x * x + y * y + z * z) for x, y, z in zip(numbers, numbers, numbers, strict=True)]

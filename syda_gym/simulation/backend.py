@@ -79,6 +79,9 @@ class Backend(Protocol):
     def advance_one(self, command: list[float]) -> list[float]:
         """``advance`` for a world of one robot; joint angles, landmark coordinates and joint speeds in one list."""
 
+    def reset_one(self, q: list[float]) -> list[float]:
+        """``reset`` for a world of one robot; joint angles, landmark coordinates and joint speeds in one list."""
+
     def close(self) -> None:
         """Releases what the world holds; harmless when repeated."""
 

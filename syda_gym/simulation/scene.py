@@ -150,7 +150,7 @@ class PosedSkeleton:
         for first, second in BONES:
             if {first, second} <= set(standing) and _wanted(second, moving):
                 length = float(np.linalg.norm(standing[second] - standing[first]))
-                self._bones.append((first, second, _capsule(pybullet, client, _BONE_RADIUS, length)))
+                self._bones.append((first, second, _bone(pybullet, client, _BONE_RADIUS, length)))
         for name in standing:
             if _wanted(name, moving):
                 head = name == "Head"
@@ -233,9 +233,10 @@ def _ball(bullet: Any, client: int, radius: float, color: Sequence[float]) -> in
     return body
 
 
-def _capsule(bullet: Any, client: int, radius: float, length: float) -> int:
+def _bone(bullet: Any, client: int, radius: float, length: float) -> int:
+    # A cylinder, whose ends lie inside the joints' balls: a capsule takes three times as long to draw.
     shape = bullet.createVisualShape(
-        bullet.GEOM_CAPSULE, radius=radius, length=length, rgbaColor=_BONE_COLOR, physicsClientId=client
+        bullet.GEOM_CYLINDER, radius=radius, length=length, rgbaColor=_BONE_COLOR, physicsClientId=client
     )
     body: int = bullet.createMultiBody(0.0, -1, shape, _AWAY, physicsClientId=client)
     return body

@@ -120,11 +120,19 @@ class ServoWorld:
     def advance_one(self, command: list[float]) -> list[float]:
         """``advance`` for a world of one robot: joint angles, landmark coordinates and joint speeds afterwards."""
         self.advance(np.array([command]))
-        row: list[float] = self.pose[0].tolist() + self.qd[0].tolist()
-        return row
+        return self._row()
+
+    def reset_one(self, q: list[float]) -> list[float]:
+        """``reset`` for a world of one robot: joint angles, landmark coordinates and joint speeds afterwards."""
+        self.reset(np.array([0]), np.array([q]))
+        return self._row()
 
     def close(self) -> None:
         """Nothing to release."""
+
+    def _row(self) -> list[float]:
+        row: list[float] = self.pose[0].tolist() + self.qd[0].tolist()
+        return row
 
     def _stop_at_limits(self) -> None:
         beyond = (self._q < self._lower) | (self._q > self._upper)

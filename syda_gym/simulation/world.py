@@ -146,6 +146,19 @@ class World:
         step, client = self._bullet.stepSimulation, self._clients[0]
         for _ in range(self.rates.substeps):
             step(client)
+        return self._read_one(puppet)
+
+    def reset_one(self, q: list[float]) -> list[float]:
+        """``reset`` for a world of one robot, without arrays on the way.
+
+        Returns:
+            Joint angles, landmark coordinates and joint speeds.
+        """
+        puppet = self._puppets[0]
+        puppet.reset(q)
+        return self._read_one(puppet)
+
+    def _read_one(self, puppet: _Puppet) -> list[float]:
         row = puppet.read()
         self._pending = row  # becomes arrays only if someone asks for them
         if self.self_collision:

@@ -21,6 +21,9 @@ from syda_gym.envs.options import TeleopOptions
 from syda_gym.envs.teleop import SydaTeleopEnv
 from syda_gym.errors import MappingError, OptionError, RouteError, SydaError
 
+STEPS = 500
+"""Over this many steps and the resets between them, bits are compared."""
+
 
 def make(cheap, **changes):
     return SydaTeleopEnv(**{**cheap, **changes})
@@ -100,7 +103,7 @@ def test_any_combination_of_options_passes_the_checker(cheap, options):
 def test_two_environments_with_one_seed_are_equal_bit_for_bit(cheap, self_collision):
     one, two = (make(cheap, self_collision=self_collision, start="uniform") for _ in range(2))
     play(two, 7, 60)  # a past of its own must not matter
-    first, second = play(one, 3, 250), play(two, 3, 250)
+    first, second = play(one, 3, STEPS), play(two, 3, STEPS)
     assert flat(first) == flat(second)
     if self_collision:
         assert any(step[-1]["contacts"] for step in first), "nothing touched: the test shows nothing"
@@ -114,10 +117,10 @@ def test_another_process_gives_the_same_bits(cheap):
         "actions = ('wave_high', 'reach_high_front')\n"
         "m = generate(('adult', 'kid', 'pepper', 'nao'), seed=4, actions=actions, variants=2)\n"
         "cheap = {'motions': m, 'mapping': 'geometric', 'preset': 'fixed', 'route': ('adult', 'pepper')}\n"
-        "print(hashlib.sha256(flat(play(make(cheap, disturbances='teleop'), 5, 150))).hexdigest())\n"
+        f"print(hashlib.sha256(flat(play(make(cheap, disturbances='teleop'), 5, {STEPS}))).hexdigest())\n"
     )
     other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    mine = hashlib.sha256(flat(play(make(cheap, disturbances="teleop"), 5, 150))).hexdigest()
+    mine = hashlib.sha256(flat(play(make(cheap, disturbances="teleop"), 5, STEPS))).hexdigest()
     assert other.stdout.split()[-1] == mine
 
 
@@ -127,13 +130,13 @@ def test_another_process_gives_the_same_bits(cheap):
     ids=str,
 )
 def test_a_pickled_environment_goes_on_with_the_same_bits(cheap, changes):
-    env = make(cheap, start="uniform", **changes)
+    env = make(cheap, start="uniform", physics_hz=60, **changes)
     play(env, 2, 33)
     twin = pickle.loads(pickle.dumps(env))
     third = copy.deepcopy(env)
     rng = np.random.default_rng(0)
     done = False
-    for _ in range(160):
+    for _ in range(STEPS):
         action = rng.uniform(-1, 1, 10).astype(np.float32)
         results = [e.reset() if done else e.step(action) for e in (env, twin, third)]
         assert flat(results[0]) == flat(results[1]) == flat(results[2])
