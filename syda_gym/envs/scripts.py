@@ -127,11 +127,13 @@ class Scripts:
 
     def base_row(self, k: int) -> FloatArray:
         """Base commands with their preview, ``((preview + 1) n,)``; a copy that the caller may hand out."""
-        return self._base_rows[self._reader[1] + k].copy()
+        row: FloatArray = self._base_rows[self._reader[1] + k].copy()
+        return row
 
     def target_row(self, k: int) -> FloatArray:
         """What the robot should do: joint angles and landmark coordinates; a copy that the caller may hand out."""
-        return self._target_rows[self._reader[2] + k].copy()
+        row: FloatArray = self._target_rows[self._reader[2] + k].copy()
+        return row
 
     def age(self, k: int) -> float:
         """Age of the newest packet [s]."""

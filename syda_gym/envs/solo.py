@@ -126,7 +126,7 @@ class Solo(Fleet):
                     break
             else:
                 return values
-        return np.minimum(np.maximum(self._checked(values[None])[0], -1.0), 1.0)
+        return np.asarray(np.minimum(np.maximum(self._checked(values[None])[0], -1.0), 1.0))
 
     def _command_of(self, values: FloatArray) -> tuple[FloatArray, FloatArray, int]:
         """Correction, command within the joint limits, and how many joints had to be clipped."""
