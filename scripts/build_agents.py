@@ -21,8 +21,6 @@ from syda_gym.agents.streams import score_streams
 from syda_gym.files import asset
 
 ROUTES = (("adult", "pepper"), ("adult", "kid", "pepper"))
-EPISODES = 24
-SEED = 7
 
 
 def main() -> None:
@@ -32,15 +30,14 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=asset("agents"))
     given = parser.parse_args()
     for route in ROUTES:
-        study = Study(given.study, 0, "full", route)
+        study = Study(given.study, route=route)
         for cell in CELLS:
-            ground = study.ground("validation", cell)
-            streams = ground.record(EPISODES, seed=SEED)
+            streams = study.judged(cell)
             candidates = study.rivals(cell)
             paths = {path.stem: path for path in stored_seeds(study.folder(cell))}
             paths |= {f"full-{path.stem}": path for path in stored_seeds(study.folder("full"))}
-            candidates |= {name: load_agent(path, ground.interface) for name, path in paths.items()}
-            scores = {name: score_streams(agent, streams, ground.rates) for name, agent in candidates.items()}
+            candidates |= {name: load_agent(path, study.interface) for name, path in paths.items()}
+            scores = {name: score_streams(agent, streams, study.rates) for name, agent in candidates.items()}
             best = min(scores, key=lambda name: scores[name].objective)
             training = read_card(paths[best])["training"] if best in paths else {"tuned": best, "cell": cell}
             target = given.out / f"{'-'.join(route)}-{study.folder(cell).name}"

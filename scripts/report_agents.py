@@ -1,9 +1,11 @@
-"""Turns a finished study (scripts/study_agents.py) into docs/study-agents.md and its pictures.
+"""Turns a finished study (scripts/study_agents.py) into docs/study-agents-tables.md, agents.json and the pictures.
 
     python scripts/report_agents.py --study study --out docs
 
-Means over the seeds of a condition come first, per test motion; then interquartile means over motions with bootstrap
-intervals that redraw motions within their action. Nothing here looks at anything but the stored figures.
+Tables hold interquartile means over all episodes and seeds of a condition, with bootstrap intervals that redraw
+episodes and seeds within their action. Bars are ratios of means, with the least and the largest ratio of a seed beside
+them. The opponent of a bar is the rival with the least J on the test motions themselves, a choice that favours the
+rivals. Nothing here looks at anything but the stored figures.
 """
 
 from __future__ import annotations
@@ -33,13 +35,11 @@ Rows = Mapping[str, Sequence[Mapping[str, Any]]]
 
 
 class Cell:
-    """Figures of one cell: per condition a matrix of motions, averaged over seeds."""
+    """Figures of one cell: per condition a matrix of seeds and test episodes."""
 
     def __init__(self, study: Path, name: str, level: str) -> None:
         self.name, self.level = name, level
         rows: Rows = read_json(study / name / f"test-{level}.json")
-        tuned = read_json(study / name / "rivals.json")
-        self.best_rival = min(RIVALS, key=lambda rival: float(tuned[rival]["validation"]["J"]))
         grouped: dict[str, list[Sequence[Mapping[str, Any]]]] = defaultdict(list)
         for label, found in rows.items():
             grouped[label.rsplit("-", 1)[0] if label[-1].isdigit() else label].append(found)
@@ -48,10 +48,15 @@ class Cell:
         first = next(iter(rows.values()))
         self.actions = [str(row["action"]) for row in first]
         self.feasible = np.array([bool(row["feasible"]) for row in first])
+        self.best_rival = min((*RIVALS, "full_rival"), key=lambda rival: float(self.values(rival, "J").mean()))
 
     def values(self, condition: str, figure: str) -> NDArray[np.float64]:
-        """One value per test motion, the mean over seeds."""
-        return np.mean([[float(row[figure]) for row in run] for run in self.runs[condition]], axis=0)
+        """One value per seed and episode, ``(seeds, episodes)``."""
+        return np.array([[float(row[figure]) for row in run] for run in self.runs[condition]])
+
+    def strata(self, condition: str) -> list[str]:
+        """The action of every value of ``values``, flattened."""
+        return self.actions * self.seeds[condition]
 
     def conditions(self) -> list[str]:
         """Rivals first, then what was learned."""
@@ -63,102 +68,122 @@ def table(cell: Cell) -> list[str]:
     lines = [
         f"### {cell.name}, level {cell.level}",
         "",
-        f"{len(cell.actions)} motions of {len(set(cell.actions))} actions; best rival on validation: "
-        f"`{cell.best_rival}`.",
+        f"{len(cell.actions)} episodes of {len(set(cell.actions))} actions; best rival: `{cell.best_rival}`.",
         "",
         "| agent | seeds | landmark error [mm] | jitter [mm/frame³] | J | 95 % of J | beats the rival |",
         "|---|---|---|---|---|---|---|",
     ]
-    rival = cell.values(cell.best_rival, "J")
-    for name in cell.conditions():
-        interval = estimate(cell.values(name, "J"), cell.actions)
-        better = probability_of_improvement(cell.values(name, "J"), rival, cell.actions, cell.actions)
+    for name, entry in summary(cell).items():
         lines.append(
-            f"| {name} | {cell.seeds[name]} | {iqm(cell.values(name, 'landmark_mm')):.2f} | "
-            f"{iqm(cell.values(name, 'jitter')):.2f} | {interval.value:.2f} | "
-            f"{interval.low:.2f} to {interval.high:.2f} | {better.value:.2f} |"
+            f"| {name} | {entry['seeds']} | {entry['landmark_mm']:.2f} | {entry['jitter']:.2f} | {entry['J']:.2f} | "
+            f"{entry['J_low']:.2f} to {entry['J_high']:.2f} | {entry['beats_rival']:.2f} |"
         )
     return [*lines, ""]
 
 
-def numbers(cells: Mapping[tuple[str, str], Cell]) -> dict[str, Any]:
-    """The tables as plain data."""
-    result: dict[str, Any] = {}
-    for (name, level), cell in cells.items():
-        rival = cell.values(cell.best_rival, "J")
-        for condition in cell.conditions():
-            values = cell.values(condition, "J")
-            interval = estimate(values, cell.actions)
-            entry = {figure: iqm(cell.values(condition, figure)) for figure in ("landmark_mm", "joint_mrad", "jitter")}
-            entry |= {"J": interval.value, "J_low": interval.low, "J_high": interval.high}
-            entry["beats_rival"] = probability_of_improvement(values, rival, cell.actions, cell.actions).value
-            entry["seeds"] = cell.seeds[condition]
-            result.setdefault(f"{name}:{level}", {})[condition] = entry
+def summary(cell: Cell) -> dict[str, dict[str, float]]:
+    """The table of one cell as plain data."""
+    rival = cell.values(cell.best_rival, "J").ravel()
+    result: dict[str, dict[str, float]] = {}
+    for condition in cell.conditions():
+        strata = cell.strata(condition)
+        values = cell.values(condition, "J").ravel()
+        interval = estimate(values, strata)
+        entry = {figure: iqm(cell.values(condition, figure)) for figure in ("landmark_mm", "joint_mrad", "jitter")}
+        entry |= {"J": interval.value, "J_low": interval.low, "J_high": interval.high}
+        entry["beats_rival"] = probability_of_improvement(values, rival, strata, cell.strata(cell.best_rival)).value
+        entry["seeds"] = cell.seeds[condition]
+        result[condition] = entry
     return result
 
 
-def ratio(cell: Cell, condition: str, baseline: str, figure: str, which: NDArray[np.bool_] | None = None) -> float:
-    """Mean of a condition over that of a baseline, on all motions or on some of them."""
-    chosen = np.ones(len(cell.actions), dtype=bool) if which is None else which
-    return float(cell.values(condition, figure)[chosen].mean() / cell.values(baseline, figure)[chosen].mean())
+class Ratio:
+    """A condition's mean over a baseline's, on all episodes or on some of them, over all seeds and seed by seed."""
+
+    def __init__(
+        self, cell: Cell, condition: str, baseline: str, figure: str, which: NDArray[np.bool_] | None = None
+    ) -> None:
+        chosen = np.ones(len(cell.actions), dtype=bool) if which is None else which
+        below = cell.values(baseline, figure)[:, chosen].mean()
+        self.seeds = cell.values(condition, figure)[:, chosen].mean(axis=1) / below
+        self.mean = float(self.seeds.mean())
+
+    def __str__(self) -> str:
+        if len(self.seeds) == 1:
+            return f"{self.mean:.3f}"
+        return f"{self.mean:.3f} ({self.seeds.min():.3f} to {self.seeds.max():.3f})"
 
 
 def bars(cells: Mapping[tuple[str, str], Cell]) -> list[str]:
     """The bars of the study, each with what was measured and whether it holds."""
-    rows = ["| bar | asked | measured | held |", "|---|---|---|---|"]
-
-    def row(words: str, asked: str, measured: str, held: bool) -> None:
-        rows.append(f"| {words} | {asked} | {measured} | {'yes' if held else '**no**'} |")
-
-    lag = cells["lag", "test"]
-    for words, rows_used in (("all motions", None), ("motions within the speed limits", lag.feasible)):
-        recovered = 1.0 - ratio(lag, "lead", "base", "landmark_mm", rows_used)
-        row(
-            f"lag: the lead recovers the base's landmark error, {words}",
-            ">= 0.90",
-            f"{recovered:.3f}",
-            recovered >= 0.90,
-        )
-    full = cells["full", "test"]
-    if "residual" in full.runs:
-        j = ratio(full, "residual", "full_rival", "J")
-        row("full: residual, J against its rival", "<= 0.98", f"{j:.3f}", j <= 0.98)
-        for (name, level), cell in cells.items():
-            if (name, level) == ("full", "test"):
-                continue
-            error = ratio(cell, "residual", "full_rival", "landmark_mm")
-            jitter = ratio(cell, "residual", "full_rival", "jitter")
-            row(
-                f"{name} ({level}): the same residual does no harm",
-                "error <= 1.05, jitter <= 1.20",
-                f"{error:.3f}, {jitter:.3f}",
-                error <= 1.05 and jitter <= 1.20,
-            )
+    rows = [_row("bar", "asked", "measured", "held"), "|---|---|---|---|"]
+    rows += _lag_bars(cells["lag", "test"])
+    rows += _residual_bars(cells)
     for name, limit in (("noise", 0.95), ("noise-latency", 0.96), ("full", 0.95)):
-        cell = cells[name, "test"]
-        found = "predictor" if "predictor" in cell.runs else "full_predictor"
-        j, error, jitter = (ratio(cell, found, cell.best_rival, f) for f in ("J", "landmark_mm", "jitter"))
-        row(f"{name}: `{found}`, J against `{cell.best_rival}`", f"<= {limit}", f"{j:.3f}", j <= limit)
-        row(
-            f"{name}: `{found}`, error and jitter",
-            "<= 1.02 and <= 0.80",
-            f"{error:.3f}, {jitter:.3f}",
-            error <= 1.02 and jitter <= 0.80,
-        )
+        rows += _predictor_bars(cells[name, "test"], limit)
     late = cells["latency", "test"]
     if "predictor" in late.runs:
-        error, jitter = (ratio(late, "predictor", late.best_rival, f) for f in ("landmark_mm", "jitter"))
-        row(
-            "latency: predictor on the Kalman stream, error at equal or lower jitter",
-            "<= 0.85 at <= 1.00",
-            f"{error:.3f} at {jitter:.3f}",
-            error <= 0.85 and jitter <= 1.0,
-        )
+        error, jitter = (Ratio(late, "predictor", late.best_rival, f) for f in ("landmark_mm", "jitter"))
+        held = error.mean <= 0.85 and jitter.mean <= 1.0
+        words = f"latency: predictor, error at equal or lower jitter than `{late.best_rival}`"
+        rows.append(_row(words, "<= 0.85 at <= 1.00", f"{error} at {jitter}", _verdict(held)))
     harsh = cells["full", "harsh"]
     if "predictor" in harsh.runs:
-        j = ratio(harsh, "predictor", harsh.best_rival, "J")
-        row("full, harsh: predictor, J against the rival", "<= 1.00", f"{j:.3f}", j <= 1.0)
+        j = Ratio(harsh, "predictor", harsh.best_rival, "J")
+        rows.append(
+            _row(f"full, harsh: predictor, J against `{harsh.best_rival}`", "<= 1.00", str(j), _verdict(j.mean <= 1.0))
+        )
     return [*rows, ""]
+
+
+def _lag_bars(lag: Cell) -> list[str]:
+    rows = []
+    for words, which in (("all motions", None), ("motions within the speed limits", lag.feasible)):
+        if which is not None and which.all():
+            continue
+        recovered = 1.0 - Ratio(lag, "lead", "base", "landmark_mm", which).mean
+        rows.append(
+            _row(f"lag: the lead recovers the base's landmark error, {words}", ">= 0.90", f"{recovered:.3f}",
+                 _verdict(recovered >= 0.90))
+        )  # fmt: skip
+    return rows
+
+
+def _residual_bars(cells: Mapping[tuple[str, str], Cell]) -> list[str]:
+    rows = []
+    for (name, level), cell in cells.items():
+        if "residual" not in cell.runs:
+            continue
+        j, error, jitter = (Ratio(cell, "residual", "full_rival", f) for f in ("J", "landmark_mm", "jitter"))
+        if (name, level) == ("full", "test"):
+            rows.append(_row("full: residual PPO, J against its rival", "<= 0.98", str(j), _verdict(j.mean <= 0.98)))
+        else:
+            held = error.mean <= 1.05 and jitter.mean <= 1.2
+            rows.append(
+                _row(f"{name}, {level}: the same residual does no harm (J {j.mean:.3f})",
+                     "error <= 1.05, jitter <= 1.20", f"{error}, {jitter}", _verdict(held))
+            )  # fmt: skip
+    return rows
+
+
+def _predictor_bars(cell: Cell, limit: float) -> list[str]:
+    if "predictor" not in cell.runs:
+        return []
+    j, error, jitter = (Ratio(cell, "predictor", cell.best_rival, f) for f in ("J", "landmark_mm", "jitter"))
+    held = error.mean <= 1.02 and jitter.mean <= 0.80
+    return [
+        _row(f"{cell.name}: predictor, J against `{cell.best_rival}`", f"<= {limit}", str(j),
+             _verdict(j.mean <= limit)),
+        _row(f"{cell.name}: its error and jitter", "<= 1.02, <= 0.80", f"{error}, {jitter}", _verdict(held)),
+    ]  # fmt: skip
+
+
+def _row(*cells: str) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _verdict(held: bool) -> str:
+    return "yes" if held else "**no**"
 
 
 def curve_picture(cells: Mapping[tuple[str, str], Cell], path: Path) -> None:
@@ -229,7 +254,10 @@ def main() -> None:
         lines = table(cell)
         first = next(index for index, line in enumerate(lines) if line.startswith("|"))
         text += [*lines[:first], *source, *lines[first:]]
-    write_json(given.out / "results" / "agents.json", {"bars": bars(cells), "cells": numbers(cells)})
+    write_json(
+        given.out / "results" / "agents.json",
+        {"bars": bars(cells), "cells": {f"{name}:{level}": summary(cell) for (name, level), cell in cells.items()}},
+    )
     write_text(
         given.out / "study-agents-tables.md",
         "\n".join(

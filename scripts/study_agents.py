@@ -1,7 +1,7 @@
 """The study of agents: tunes rivals, trains predictors and residual policies, touches the test motions once, in Bullet.
 
     python scripts/study_agents.py --out study --seeds 5            # everything, resumable: finished parts are kept
-    python scripts/study_agents.py --out study --stages evaluate report
+    python scripts/study_agents.py --out study --stages predict --cells noise --seeds 3 --first-seed 2      # one part
 
 Motions are generated: training, validation and test motions are of different gesture families; tuning, training and
 selection never see the test families or the test level of disturbances. Every part is written as soon as it is done, so
@@ -14,23 +14,23 @@ import argparse
 import json
 import time
 import zlib
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from syda_gym.agents.agent import Agent, BaseAlone
+from syda_gym.agents.agent import Agent
 from syda_gym.agents.bundle import load_agent, save_agent
 from syda_gym.agents.classical import CONTACT_RIVALS, RIVALS, make_rival
 from syda_gym.agents.config import ResidualConfig
-from syda_gym.agents.figures import Figures
 from syda_gym.agents.interface import Interface
 from syda_gym.agents.predictor_training import PredictorConfig, train_predictor
 from syda_gym.agents.recording import Ground
 from syda_gym.agents.rollout import EpisodeResult, evaluate
-from syda_gym.agents.streams import score_streams
+from syda_gym.agents.streams import Streams, score_streams
 from syda_gym.agents.training import train_on_streams
 from syda_gym.agents.tuning import tune
 from syda_gym.envs.options import TeleopOptions
@@ -39,28 +39,29 @@ from syda_gym.mappings.mapping import Mapping
 from syda_gym.mappings.storage import load_mapping
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.synthetic import generate
+from syda_gym.simulation.rates import Rates
 
 TRAIN = ("reach", "wave", "point", "lift", "circle", "push", "work")
 VALIDATION = ("swing", "bow")
 TEST = ("cross", "clap", "signal")
 CELLS = ("lag", "noise", "latency", "noise+latency", "full")
-PREDICTED = ("full", "noise", "latency", "noise+latency")
-LATE = ("latency", "noise+latency", "full")  # cells whose predictor stands on the Kalman filter
+PREDICTED = ("noise", "latency", "noise+latency", "full")
 PHYSICS_HZ = 60.0
+NAMES = tuple(name for name in RIVALS if name not in CONTACT_RIVALS)
 
 
 @dataclass(frozen=True)
 class Size:
     """How much of everything; ``small`` is for trying the script."""
 
-    variants: int = 4
-    episodes: int = 200
-    tuning_episodes: int = 40
-    validation_episodes: int = 24
-    budget: int = 20
-    iterations: int = 300
-    steps: int = 300_000
-    test_variants: int = 1
+    variants: int = 6
+    episodes: int = 160
+    tuning_episodes: int = 36
+    validation_episodes: int = 36
+    budget: int = 32
+    iterations: int = 400
+    steps: int = 400_000
+    test_variants: int = 2
 
 
 SIZES = {"full": Size(), "small": Size(1, 48, 12, 8, 3, 24, 20_000, 1)}
@@ -71,16 +72,23 @@ class Study:
 
     Args:
         out: where everything is written.
-        seeds: number of seeds per learned condition.
         size: of ``SIZES``.
         route: bodies from the operator to the robot.
+        seeds: of the learned conditions.
+        cells: of the suite, those that are worked on.
     """
 
-    def __init__(self, out: Path, seeds: int, size: str, route: tuple[str, ...]) -> None:
-        self.out, self.seeds, self.size = out, seeds, SIZES[size]
-        self.route = route
+    def __init__(
+        self,
+        out: Path,
+        size: str = "full",
+        route: tuple[str, ...] = ("adult", "pepper"),
+        seeds: Sequence[int] = (),
+        cells: Sequence[str] = CELLS,
+    ) -> None:
+        self.out, self.size, self.route, self.seeds, self.cells = out, SIZES[size], route, seeds, cells
         self.mapping = self._mapping(route)
-        self._grounds: dict[tuple[str, str], Ground] = {}
+        self._grounds: dict[str, Ground] = {}
 
     def _mapping(self, route: tuple[str, ...]) -> Mapping:
         """The shipped mappings in series; what agents repair is measured against the same mapping, undisturbed."""
@@ -104,18 +112,31 @@ class Study:
         }
         return TeleopOptions(**{**values, **changes})
 
-    def ground(self, part: str, cell: str) -> Ground:
-        """Training or validation motions under a cell's range of disturbances."""
-        if (part, cell) not in self._grounds:
-            known = next((g for (p, _), g in self._grounds.items() if p == part), None)
-            if known is None:
-                motions = self.motions(part)
-                known = Ground(self.options(motions, cell, "train"))
-            ground = object.__new__(Ground)
-            ground.__dict__.update(known.__dict__)
-            ground.options = replace(known.options, disturbances=f"teleop:{cell}:train")
-            self._grounds[part, cell] = ground
-        return self._grounds[part, cell]
+    def ground(self, part: str) -> Ground:
+        """Training or validation motions."""
+        if part not in self._grounds:
+            self._grounds[part] = Ground(self.options(self.motions(part), "lag", "train"))
+        return self._grounds[part]
+
+    def streams(self, part: str, cell: str, episodes: int, seed: int) -> Streams:
+        """Episodes of training or validation motions, spread over all clips, under a cell's range of disturbances."""
+        ground = self.ground(part)
+        clips = np.linspace(0, ground.clips - 1, min(episodes, ground.clips)).round().astype(int).tolist()
+        return ground.record(episodes, clips=clips, disturbances=f"teleop:{cell}:train", seed=seed)
+
+    def judged(self, cell: str) -> Streams:
+        """The validation episodes of a cell, the same for everyone who is judged on them."""
+        return self.streams("validation", cell, self.size.validation_episodes, seed=7)
+
+    @property
+    def interface(self) -> Interface:
+        """Of the environment."""
+        return self.ground("validation").interface
+
+    @property
+    def rates(self) -> Rates:
+        """Of the environment."""
+        return self.ground("validation").rates
 
     def motions(self, part: str) -> Motions:
         """Clean motions of the operator; the disturbances bring the noise."""
@@ -131,8 +152,11 @@ class Study:
     def rivals(self, cell: str) -> dict[str, Agent]:
         """The tuned rivals of a cell."""
         stored = read_json(self.folder(cell) / "rivals.json")
-        interface = self.ground("validation", cell).interface
-        return {name: make_rival(name, interface, **entry["settings"]) for name, entry in stored.items()}
+        return {name: make_rival(name, self.interface, **entry["settings"]) for name, entry in stored.items()}
+
+    def trained(self, folder: Path, kind: str) -> dict[str, Agent]:
+        """The agents of one kind that were trained for a cell, one a seed."""
+        return {path.stem: load_agent(path, self.interface) for path in sorted(folder.glob(f"{kind}-[0-9].json"))}
 
     def best_rival(self, cell: str) -> str:
         """The rival with the least objective on the validation motions."""
@@ -142,22 +166,18 @@ class Study:
 
 def tune_rivals(study: Study) -> None:
     """Fits every rival to every cell on training motions, and notes its figures on validation motions."""
-    for cell in CELLS:
+    for cell in study.cells:
         path = study.folder(cell) / "rivals.json"
         if path.is_file():
             continue
-        train, validation = study.ground("train", cell), study.ground("validation", cell)
-        streams = train.record(study.size.tuning_episodes, seed=zlib.crc32(cell.encode()), clips=_spread(train, study))
-        judged = validation.record(study.size.validation_episodes, seed=7)
+        streams = study.streams("train", cell, study.size.tuning_episodes, seed=zlib.crc32(cell.encode()))
+        judged = study.judged(cell)
         found = {}
-        for name in [name for name in RIVALS if name not in CONTACT_RIVALS]:
+        for name in NAMES:
             began = time.perf_counter()
-
-            def score(agent: Agent) -> Figures:
-                return score_streams(agent, streams, train.rates)  # noqa: B023 (used within this turn only)
-
-            tuned = tune(name, train.interface, score, budget=study.size.budget)
-            figures = score_streams(tuned.build(train.interface), judged, train.rates)
+            score = partial(score_streams, streams=streams, rates=study.rates)
+            tuned = tune(name, study.interface, score, budget=study.size.budget)
+            figures = score_streams(tuned.build(study.interface), judged, study.rates)
             found[name] = {
                 "settings": dict(tuned.settings),
                 "training": tuned.figures.as_dict(),
@@ -169,78 +189,59 @@ def tune_rivals(study: Study) -> None:
 
 
 def train_predictors(study: Study) -> None:
-    """One predictor per cell and seed."""
-    for seed in range(study.seeds):
-        for cell in PREDICTED:
-            path = study.folder(cell) / f"predictor-{seed}.json"
-            if path.is_file():
+    """One predictor per cell and seed, on the cell's tuned Kalman filter without its lead."""
+    for seed in study.seeds:
+        for cell in study.cells:
+            if cell not in PREDICTED or (study.folder(cell) / f"predictor-{seed}.json").is_file():
                 continue
-            train, validation = study.ground("train", cell), study.ground("validation", cell)
-            base: Agent = BaseAlone(train.interface)
-            if cell in LATE:
-                lead = study.rivals(cell)["kalman"]
-                base = lead.base if lead.base is not None else lead
-            began = time.perf_counter()
+            lead = study.rivals(cell)["kalman"]
+            assert lead.base is not None
+            streams = study.streams("train", cell, study.size.episodes, seed=1000 + seed)
+            judged = study.judged(cell)
+            began = time.process_time()
             trained = train_predictor(
-                base,
-                train.record(study.size.episodes, seed=1000 + seed),
-                validation.record(study.size.validation_episodes, seed=7),
-                train.rates,
-                PredictorConfig(iterations=study.size.iterations),
-                seed=seed,
+                lead.base, streams, judged, study.rates, PredictorConfig(iterations=study.size.iterations), seed=seed
             )
-            seconds = round(time.perf_counter() - began, 1)
+            seconds = round(time.process_time() - began, 1)
             curve = [figures.as_dict() for figures in trained.history]
             _store(study, cell, f"predictor-{seed}", trained.agent, seed, seconds, curve)
-            print(f"{cell:14} predictor {seed}: J {curve[trained.best]['J']:.2f} in {seconds} s", flush=True)
+            print(f"{cell:14} predictor {seed}: J {curve[trained.best]['J']:.2f}, {seconds} s of CPU", flush=True)
 
 
 def train_residuals(study: Study) -> None:
     """Residual policies on the best rival of the full suite."""
     cell = "full"
-    for seed in range(study.seeds):
-        if (study.folder(cell) / f"residual-{seed}.json").is_file():
+    for seed in study.seeds:
+        if cell not in study.cells or (study.folder(cell) / f"residual-{seed}.json").is_file():
             continue
-        train, validation = study.ground("train", cell), study.ground("validation", cell)
         base = study.rivals(cell)[study.best_rival(cell)]
-        began = time.perf_counter()
-        trained = train_on_streams(
-            base,
-            train.record(study.size.episodes, seed=2000 + seed),
-            validation.record(study.size.validation_episodes, seed=7),
-            train.rates,
-            ResidualConfig.preset("teleop", steps=study.size.steps, legs=5),
-            seed=seed,
-        )
-        seconds = round(time.perf_counter() - began, 1)
+        streams = study.streams("train", cell, study.size.episodes, seed=2000 + seed)
+        judged = study.judged(cell)
+        began = time.process_time()
+        config = ResidualConfig.preset("teleop", steps=study.size.steps, legs=6)
+        trained = train_on_streams(base, streams, judged, study.rates, config, seed=seed)
+        seconds = round(time.process_time() - began, 1)
         curve = [{"steps": leg.steps, **leg.policy.as_dict()} for leg in trained.history]
         _store(study, cell, f"residual-{seed}", trained.agent, seed, seconds, curve)
-        print(f"{cell:14} residual {seed}: J {curve[trained.best]['J']:.2f} in {seconds} s", flush=True)
+        print(f"{cell:14} residual {seed}: J {curve[trained.best]['J']:.2f}, {seconds} s of CPU", flush=True)
 
 
 def evaluate_all(study: Study) -> None:
     """The one look at the test motions: every agent of every cell, in Bullet."""
     motions = study.motions("test")
+    full = study.folder("full")
     for cell, level in [*((cell, "test") for cell in CELLS), ("full", "harsh")]:
         path = study.folder(cell) / f"test-{level}.json"
-        if path.is_file():
+        if cell not in study.cells or path.is_file():
             continue
-        agents = study.rivals(cell)
-        interface = study.ground("validation", cell).interface
-        agents |= {p.stem: load_agent(p, interface) for p in sorted(study.folder(cell).glob("predictor-*.json"))}
-        full = study.rivals("full")[study.best_rival("full")]
-        agents["full_rival"] = full
-        agents |= {p.stem: load_agent(p, interface) for p in sorted(study.folder("full").glob("residual-*.json"))}
+        agents = study.rivals(cell) | study.trained(study.folder(cell), "predictor") | study.trained(full, "residual")
+        agents["full_rival"] = study.rivals("full")[study.best_rival("full")]
         if cell != "full":
-            agents |= {
-                f"full_{p.stem}": load_agent(p, interface)
-                for p in sorted(study.folder("full").glob("predictor-*.json"))
-            }
-        options = study.options(motions, cell, level, physics="bullet")
-        results = evaluate(options, agents, draws=1, seed=5000)
+            agents |= {f"full_{name}": agent for name, agent in study.trained(full, "predictor").items()}
+        results = evaluate(study.options(motions, cell, level, physics="bullet"), agents, draws=1, seed=5000)
         rows = {
             name: [
-                {"motion": r.motion, "action": r.action, "feasible": _feasible(r, interface), **r.figures.as_dict()}
+                {"motion": r.motion, "action": r.action, "feasible": _feasible(r, study), **r.figures.as_dict()}
                 for r in found
             ]
             for name, found in results.items()
@@ -254,15 +255,11 @@ def stored_seeds(folder: Path) -> list[Path]:
     return sorted(folder.glob("*-[0-9].json"))
 
 
-def _spread(ground: Ground, study: Study) -> list[int]:
-    """Training clips spread over all actions."""
-    return np.linspace(0, ground.clips - 1, min(study.size.tuning_episodes, ground.clips)).round().astype(int).tolist()
-
-
-def _feasible(result: EpisodeResult, interface: Interface) -> bool:
+def _feasible(result: EpisodeResult, study: Study) -> bool:
     """Whether the reference keeps the joints' speed limits; where it jumps, no agent can follow."""
     fastest = np.abs(np.diff(result.reference, axis=0)).max(axis=0)
-    return bool((fastest <= interface.robot.speed * interface.dt).all())
+    limit = study.interface.robot.speed * study.interface.dt
+    return bool((fastest <= limit * (1.0 + 1e-6)).all())
 
 
 def _store(
@@ -296,12 +293,15 @@ def main() -> None:
     }
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("study"))
-    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--seeds", type=int, default=5, help="seeds 0 to SEEDS - 1")
+    parser.add_argument("--first-seed", type=int, default=0, help="leave out the seeds before")
+    parser.add_argument("--cells", nargs="+", choices=CELLS, default=list(CELLS))
     parser.add_argument("--size", choices=sorted(SIZES), default="full")
     parser.add_argument("--route", nargs="+", default=["adult", "pepper"])
     parser.add_argument("--stages", nargs="+", choices=sorted(stages), default=list(stages))
     given = parser.parse_args()
-    study = Study(given.out, given.seeds, given.size, tuple(given.route))
+    seeds = range(given.first_seed, given.seeds)
+    study = Study(given.out, given.size, tuple(given.route), seeds, given.cells)
     for stage in given.stages:
         stages[stage](study)
 

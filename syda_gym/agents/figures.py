@@ -12,7 +12,7 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import AgentError
 
-__all__ = ["JOINT_WEIGHT", "Figures", "episode_figures", "mean_figures"]
+__all__ = ["JOINT_WEIGHT", "Figures", "episode_figures", "figures_of_points", "mean_figures"]
 
 JOINT_WEIGHT = 0.05
 """Weight of a milliradian of joint error against a millimetre of landmark error in the objective."""
@@ -62,10 +62,24 @@ def episode_figures(robot: Robot, q: ArrayLike, reference: ArrayLike, contacts: 
     moved, wanted = np.asarray(q, dtype=np.float64), np.asarray(reference, dtype=np.float64)
     if moved.shape != wanted.shape or moved.ndim != 2 or len(moved) < 4:
         raise AgentError(f"expected two arrays (T, n) with T >= 4, got {moved.shape} and {wanted.shape}")
-    points = robot.landmarks(moved)
+    return figures_of_points(moved, wanted, robot.landmarks(moved), robot.landmarks(wanted), contacts)
+
+
+def figures_of_points(
+    q: FloatArray, reference: FloatArray, points: FloatArray, targets: FloatArray, contacts: ArrayLike | None = None
+) -> Figures:
+    """``episode_figures`` where the landmarks are known already.
+
+    Args:
+        q: joint angles after each control step ``(T, n)`` [rad].
+        reference: where they should have been ``(T, n)`` [rad].
+        points: landmarks of ``q`` ``(T, P, 3)`` [m].
+        targets: landmarks of ``reference`` ``(T, P, 3)`` [m].
+        contacts: contacts in each step ``(T,)``; none if left out.
+    """
     return Figures(
-        landmark_mm=1e3 * float(np.linalg.norm(points - robot.landmarks(wanted), axis=-1).mean()),
-        joint_mrad=1e3 * float(np.abs(moved - wanted).mean()),
+        landmark_mm=1e3 * float(np.linalg.norm(points - targets, axis=-1).mean()),
+        joint_mrad=1e3 * float(np.abs(q - reference).mean()),
         jitter=jitter(points),
         contact_steps=0.0 if contacts is None else float((np.asarray(contacts) > 0).mean()),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,9 @@ from syda_gym.agents.agent import Agent
 from syda_gym.agents.classical import Lead
 from syda_gym.agents.figures import JOINT_WEIGHT, Figures
 from syda_gym.agents.interface import Interface, lag_share
-from syda_gym.agents.predictor import Predictor, network_inputs
+from syda_gym.agents.predictor import Predictor, input_count, network_inputs
 from syda_gym.agents.streams import Streams, play_streams, read_stream, score_streams
-from syda_gym.agents.tcn import DILATIONS, TcnShape, receptive_field
+from syda_gym.agents.tcn import TcnShape, receptive_field
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import AgentError
 from syda_gym.simulation.rates import Rates
@@ -23,7 +23,10 @@ from syda_gym.simulation.rates import Rates
 if TYPE_CHECKING:
     import torch
 
-__all__ = ["PredictorConfig", "TrainedPredictor", "train_predictor"]
+__all__ = ["BLIND", "PredictorConfig", "TrainedPredictor", "train_predictor"]
+
+BLIND = ("base", "ema", "one_euro", "kalman")
+"""Agents that a predictor can stand on: their commands do not depend on the joint angles."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +38,10 @@ class PredictorConfig:
         iterations: optimiser steps.
         batch: stretches of episodes per step.
         window: control steps of a stretch; the network is shown the steps before it as well.
-        learning_rate: at the start; it falls along a cosine.
+        learning_rate: the largest; it rises over the first tenth and falls along a cosine.
         weight_decay: of AdamW.
         jitter_weight: of the jitter against the landmark error; 1 trains on the objective ``J`` itself.
+        averaging: share of the old in the running average of the weights, which is what is kept.
         strength: of the lead on top.
         bound: largest correction [rad].
         rounds: how often the network is played in the servo model to renew the joint angles it reads, and judged on the
@@ -52,6 +56,7 @@ class PredictorConfig:
     learning_rate: float = 3e-3
     weight_decay: float = 1e-3
     jitter_weight: float = 1.0
+    averaging: float = 0.95
     strength: float = 1.0
     bound: float = 0.6
     rounds: int = 3
@@ -63,6 +68,8 @@ class PredictorConfig:
                 raise AgentError(f"predictor: {name} must be at least 1, got {getattr(self, name)}")
         if self.rounds > self.iterations:
             raise AgentError(f"predictor: {self.rounds} rounds need at least as many iterations, got {self.iterations}")
+        if not 0.0 <= self.averaging < 1.0:
+            raise AgentError(f"predictor: averaging must be at least 0 and below 1, got {self.averaging}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +104,7 @@ def train_predictor(
     acceleration limit is left out: gradients through it diverge. The untrained network corrects nothing.
 
     Args:
-        base: the agent below; must not look at joint angles (``BaseAlone``, ``Kalman``, filters; no lead).
+        base: the agent below, a stack of ``BLIND`` agents.
         train: streams to learn from.
         validation: streams by which the best round is chosen.
         rates: control and physics rate.
@@ -106,11 +113,17 @@ def train_predictor(
         progress: called with the share that is done.
 
     Raises:
-        AgentError: bad settings.
+        AgentError: a base that looks at the joint angles.
     """
     import torch
 
     settings = config or PredictorConfig()
+    looking = [name for name in base.stack if name not in BLIND]
+    if looking:
+        raise AgentError(
+            f"a predictor cannot stand on {looking[0]!r}, whose commands depend on the joint angles; use a stack of "
+            f"{', '.join(BLIND)} (the predictor brings its own lead)"
+        )
     torch.set_num_threads(1)
     trainer = _Trainer(base, train, rates, settings, seed)
     history, snapshots = [], []
@@ -135,31 +148,36 @@ class _Trainer:
     def __init__(self, base: Agent, train: Streams, rates: Rates, config: PredictorConfig, seed: int) -> None:
         import torch
 
+        from syda_gym.agents.predictor_torch import TorchLandmarks, initial_weights, response
+
         self.base, self.rates, self.config = base, rates, config
         self.interface = base.interface
         self.streams = _with_mirror(self.interface, train) if config.mirror else train
         self._rng = np.random.default_rng(seed)
         n = self.interface.n
-        self.shape = TcnShape(3 * n + 1, config.channels, n)
-        self._parameters = _initial(self.shape, seed)
+        self._parameters = initial_weights(TcnShape(input_count(self.interface), config.channels, n), seed)
+        self._average = self._snapshot()
         self._optimiser = torch.optim.AdamW(
             self._parameters.values(), lr=config.learning_rate, weight_decay=config.weight_decay
         )
-        self._schedule = torch.optim.lr_scheduler.CosineAnnealingLR(self._optimiser, config.iterations)
+        self._schedule = torch.optim.lr_scheduler.OneCycleLR(
+            self._optimiser, config.learning_rate, total_steps=config.iterations + 1, pct_start=0.1
+        )
         self._below = commands_below(base, self.streams)
         self._kinematics = TorchLandmarks(self.interface)
         self._before = torch.zeros(0)
         self._reference = torch.as_tensor(self.streams.reference, dtype=torch.float32)
         with torch.no_grad():
-            self._targets = torch.stack([self._kinematics(reference) for reference in self._reference])
+            self._targets = self._kinematics(self._reference)
         self._mask = torch.as_tensor(self.streams.mask)
-        self._share = torch.as_tensor(_motor_shares(self.streams, rates, config), dtype=torch.float32)
+        self._window = min(config.window, self.streams.base.shape[1])
+        self._response = response(_motor_shares(self.streams, rates, config), self._window)
         self._inputs = torch.zeros(0)
         self._commands = torch.as_tensor(self._below, dtype=torch.float32)
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
-        """The weights as they are now."""
-        return {name: value.detach().numpy().copy() for name, value in self._parameters.items()}
+        """The running average of the weights."""
+        return {name: value.copy() for name, value in self._average.items()}
 
     def agent(self, weights: dict[str, NDArray[np.float32]]) -> Agent:
         """The stack with given weights."""
@@ -173,7 +191,7 @@ class _Trainer:
 
         before = np.concatenate([self.streams.base[:, :1], q_after[:, :-1]], axis=1)
         last = np.concatenate([self._below[:, :1], self._below[:, :-1]], axis=1)
-        inputs = network_inputs(self.interface, self._below, last, before, self.streams.age)
+        inputs = network_inputs(self.interface, self._below, last, self.streams.base, before, self.streams.age)
         self._inputs = torch.as_tensor(inputs, dtype=torch.float32)
         self._before = torch.as_tensor(before, dtype=torch.float32)
 
@@ -183,95 +201,46 @@ class _Trainer:
 
         for _ in range(iterations):
             rows = self._rng.choice(len(self.streams), min(self.config.batch, len(self.streams)), False)
-            window = min(self.config.window, self.streams.base.shape[1])
-            latest = np.maximum(self.streams.lengths[rows] - window, 0)
+            latest = np.maximum(self.streams.lengths[rows] - self._window, 0)
             starts = (self._rng.random(len(rows)) * (latest + 1)).astype(np.int64)
-            loss = self._loss(torch.as_tensor(rows), torch.as_tensor(starts), window)
+            loss = self._loss(torch.as_tensor(rows), torch.as_tensor(starts))
             self._optimiser.zero_grad()
             loss.backward()  # type: ignore[no-untyped-call]
             torch.nn.utils.clip_grad_norm_(self._parameters.values(), 1.0)
             self._optimiser.step()
             self._schedule.step()
+            self._blend()
 
-    def _loss(self, rows: torch.Tensor, starts: torch.Tensor, window: int) -> torch.Tensor:
-        """The objective over stretches of ``window`` steps that begin at ``starts`` of episodes ``rows``."""
+    def _blend(self) -> None:
+        """Moves the running average towards the weights as they are now."""
+        share = 1.0 - self.config.averaging
+        for name, value in self._snapshot().items():
+            self._average[name] += np.float32(share) * (value - self._average[name])
+
+    def _snapshot(self) -> dict[str, NDArray[np.float32]]:
+        return {name: value.detach().numpy().copy() for name, value in self._parameters.items()}
+
+    def _loss(self, rows: torch.Tensor, starts: torch.Tensor) -> torch.Tensor:
+        """The objective over stretches that begin at ``starts`` of episodes ``rows``."""
         import torch
 
+        from syda_gym.agents.predictor_torch import follow, tcn
+
         ahead = receptive_field() - 1
-        times = starts[:, None] + torch.arange(-ahead, window)
+        times = starts[:, None] + torch.arange(-ahead, self._window)
         # Before an episode the network takes its past to have been equal to the first step.
         seen = self._inputs[rows[:, None], times.clamp(min=0)]
         at = (rows[:, None], times[:, ahead:])
         bound = self.config.bound
         correction = tcn(self._parameters, seen)[:, ahead:]
         commands = self._commands[at] + bound * torch.tanh(correction / bound)
-        q = _servo(commands, self._before[rows, starts], self._share[rows])
+        weights, left = self._response
+        q = follow(commands, self._before[rows, starts], (weights[rows], left[rows]))
         mask, points, targets = self._mask[at], self._kinematics(q), self._targets[at]
         landmark = 1e3 * _masked(_length(points - targets).mean(-1), mask)
         joint = 1e3 * _masked((q - self._reference[at]).abs().mean(-1), mask)
         jitter = 1e3 * _masked(_length(torch.diff(points, n=3, dim=1)).mean(-1), mask[:, 3:])
         return landmark + JOINT_WEIGHT * joint + self.config.jitter_weight * jitter
-
-
-class TorchLandmarks:
-    """Elbows and wrists of a robot in torch, differentiable.
-
-    Args:
-        interface: whose robot.
-    """
-
-    def __init__(self, interface: Interface) -> None:
-        import torch
-
-        self._arms = [
-            (
-                part,
-                [torch.as_tensor(r, dtype=torch.float32) for r in chain.rotations],
-                [torch.as_tensor(o, dtype=torch.float32) for o in chain.offsets],
-                [torch.as_tensor(_cross(a), dtype=torch.float32) for a in chain.axes],
-                [(chain.point_joints[p], torch.as_tensor(chain.point_offsets[p], dtype=torch.float32)) for p in (1, 2)],
-            )
-            for chain, part in zip(interface.robot.chains, interface.robot.arm_slices, strict=True)
-        ]
-
-    def __call__(self, q: torch.Tensor) -> torch.Tensor:
-        """Joint angles ``(..., n)`` [rad] to landmarks ``(..., 2 * arms, 3)`` [m]."""
-        import torch
-
-        found = []
-        for part, rotations, offsets, crosses, points in self._arms:
-            angles = q[..., part]
-            rotation = torch.eye(3).expand(*angles.shape[:-1], 3, 3)
-            position = torch.zeros(*angles.shape[:-1], 3)
-            placed = {}
-            for i, (fixed, offset, cross) in enumerate(zip(rotations, offsets, crosses, strict=True)):
-                position = position + rotation @ offset
-                turn = (
-                    torch.eye(3)
-                    + torch.sin(angles[..., i, None, None]) * cross
-                    + (1.0 - torch.cos(angles[..., i, None, None])) * (cross @ cross)
-                )
-                rotation = rotation @ fixed @ turn
-                for index, (carrier, at) in enumerate(points):
-                    if carrier == i:
-                        placed[index] = position + rotation @ at
-            found += [placed[index] for index in sorted(placed)]
-        return torch.stack(found, dim=-2)
-
-
-def tcn(parameters: dict[str, Any], inputs: torch.Tensor) -> torch.Tensor:
-    """The network of ``tcn.StreamingTcn`` over whole sequences ``(E, T, inputs)``; returns ``(E, T, outputs)``."""
-    import torch
-
-    steps = inputs.shape[1]
-    hidden = torch.relu(inputs @ parameters["inlet.weight"].T + parameters["inlet.bias"])
-    for block, dilation in enumerate(DILATIONS):
-        taps = parameters[f"blocks.{block}.weight"]
-        past = torch.cat([hidden[:, :1].expand(-1, 2 * dilation, -1), hidden], dim=1)
-        mixed = past[:, :steps] @ taps[0].T + past[:, dilation : dilation + steps] @ taps[1].T + hidden @ taps[2].T
-        hidden = hidden + torch.relu(mixed + parameters[f"blocks.{block}.bias"])
-    result: torch.Tensor = hidden @ parameters["outlet.weight"].T + parameters["outlet.bias"]
-    return result
 
 
 def commands_below(base: Agent, streams: Streams) -> FloatArray:
@@ -282,32 +251,6 @@ def commands_below(base: Agent, streams: Streams) -> FloatArray:
         q = streams.reference[:, t]
         result[:, t] = base.act_on(read_stream(base.interface, streams, t, q, np.zeros_like(q)))
     return result
-
-
-def _initial(shape: TcnShape, seed: int) -> dict[str, torch.Tensor]:
-    import torch
-
-    generator = torch.Generator().manual_seed(seed)
-    parameters = {}
-    for name, size in shape.shapes().items():
-        if name.endswith("bias") or name.startswith("outlet"):
-            value = torch.zeros(size)
-        else:
-            fan_in = size[-1] * (size[0] if len(size) == 3 else 1)
-            value = torch.randn(size, generator=generator) * float(np.sqrt(1.0 / fan_in))
-        parameters[name] = value.requires_grad_()
-    return parameters
-
-
-def _servo(commands: torch.Tensor, start: torch.Tensor, share: torch.Tensor) -> torch.Tensor:
-    """``q += k (c - q)`` over time; commands ``(E, T, n)``, start ``(E, n)``, share ``(E, 1)``."""
-    import torch
-
-    q, found = start, []
-    for command in commands.unbind(1):
-        q = q + share * (command - q)
-        found.append(q)
-    return torch.stack(found, dim=1)
 
 
 def _motor_shares(streams: Streams, rates: Rates, config: PredictorConfig) -> FloatArray:
@@ -328,11 +271,6 @@ def _with_mirror(interface: Interface, streams: Streams) -> Streams:
         reference=robot.mirror(streams.reference.reshape(-1, shape[-1])).reshape(shape),
     )
     return join([streams, mirrored])
-
-
-def _cross(axis: FloatArray) -> FloatArray:
-    x, y, z = axis
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _length(vectors: torch.Tensor) -> torch.Tensor:

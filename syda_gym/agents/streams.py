@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.agents.agent import Agent
-from syda_gym.agents.figures import Figures, episode_figures, mean_figures
+from syda_gym.agents.figures import Figures, figures_of_points, mean_figures
 from syda_gym.agents.interface import Interface, Reading
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import AgentError
 from syda_gym.simulation.backend import MotorConditions, make_world
 from syda_gym.simulation.capsules import CapsuleModel
@@ -190,7 +191,19 @@ def stream_figures(
     def touching(e: int, length: int) -> NDArray[np.bool_] | None:
         return None if capsules is None else capsules.clearance(q[e, skip:length]) < 0.0
 
+    points, targets = _landmarks(robot, q), _landmarks(robot, streams.reference)
     return [
-        episode_figures(robot, q[e, skip:length], streams.reference[e, skip:length], touching(e, length))
+        figures_of_points(
+            q[e, skip:length],
+            streams.reference[e, skip:length],
+            points[e, skip:length],
+            targets[e, skip:length],
+            touching(e, length),
+        )
         for e, length in enumerate(streams.lengths.tolist())
     ]
+
+
+def _landmarks(robot: Robot, q: FloatArray) -> FloatArray:
+    """Landmarks ``(E, T, P, 3)`` of joint angles ``(E, T, n)``, all at once: a call costs more than its rows."""
+    return robot.landmarks(q.reshape(-1, q.shape[-1])).reshape(*q.shape[:2], -1, 3)

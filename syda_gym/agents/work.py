@@ -12,7 +12,7 @@ import numpy as np
 
 from syda_gym.agents.agent import Agent, BaseAlone
 from syda_gym.agents.bundle import load_agent, read_card, save_agent
-from syda_gym.agents.classical import RIVALS, make_rival
+from syda_gym.agents.classical import RIVALS, Lead, make_rival
 from syda_gym.agents.config import ResidualConfig
 from syda_gym.agents.figures import Figures
 from syda_gym.agents.interface import Interface
@@ -80,7 +80,8 @@ def train_agent(
         config: a ``ResidualConfig`` trains a residual policy by reinforcement learning, a ``PredictorConfig`` a
             predictor by regression.
         base: what it stands on: a rival's name, or the path of a bundle. A residual configuration that names a rival of
-            its own comes first where this is ``base``.
+            its own comes first where this is ``base``. A lead on top of it is left off below a predictor, which brings
+            its own.
         seed: of everything.
         resume: go on from the checkpoint in ``out`` (residual policies).
         progress: called with the share that is done.
@@ -92,11 +93,13 @@ def train_agent(
     settings = config or ResidualConfig()
     folder = Path(out)
     if isinstance(settings, PredictorConfig):
-        report = _predict(ground, settings, find_agent(base, ground.interface), seed, folder, progress)
+        below = find_agent(base, ground.interface)
+        filters = below.base if isinstance(below, Lead) and below.base is not None else below
+        report = _predict(ground, settings, filters, seed, folder, progress)
     else:
-        below = None if os.fspath(base) == "base" else find_agent(base, ground.interface)
+        rival = None if os.fspath(base) == "base" else find_agent(base, ground.interface)
         trained = train_residual(
-            ground, settings, seed=seed, folder=folder, resume=resume, progress=progress, base=below
+            ground, settings, seed=seed, folder=folder, resume=resume, progress=progress, base=rival
         )
         history = tuple((leg.steps, leg.policy, leg.base) for leg in trained.history)
         report = TrainingReport(trained.agent, folder / "agent.json", history, trained.best)

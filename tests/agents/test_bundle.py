@@ -25,7 +25,7 @@ def deep_stack(interface):
     """A learned agent on a learned agent on filters."""
     n = interface.n
     rng = np.random.default_rng(0)
-    shapes = TcnShape(3 * n + 1, 8, n).shapes()
+    shapes = TcnShape(4 * n + 1, 8, n).shapes()
     weights = {name: rng.normal(0, 0.1, size).astype(np.float32) for name, size in shapes.items()}
     kalman = make_rival("kalman", interface, process=7.0).base
     predictor = Predictor(interface, kalman, weights=weights, channels=8)

@@ -8,15 +8,9 @@ import torch
 
 from syda_gym.agents.agent import BaseAlone
 from syda_gym.agents.classical import Lead, make_rival
-from syda_gym.agents.predictor import Predictor
-from syda_gym.agents.predictor_training import (
-    PredictorConfig,
-    TorchLandmarks,
-    _initial,
-    commands_below,
-    tcn,
-    train_predictor,
-)
+from syda_gym.agents.predictor import Predictor, input_count, network_inputs
+from syda_gym.agents.predictor_torch import TorchLandmarks, follow, initial_weights, response, tcn
+from syda_gym.agents.predictor_training import PredictorConfig, commands_below, train_predictor
 from syda_gym.agents.streams import play_streams, score_streams
 from syda_gym.agents.tcn import StreamingTcn, TcnShape, receptive_field
 from syda_gym.errors import AgentError
@@ -59,10 +53,22 @@ def test_torch_kinematics_equal_the_robots_own(interface):
     assert np.allclose(ours, interface.robot.landmarks(q), atol=1e-5)
 
 
+def test_the_motor_law_as_one_product_equals_step_after_step():
+    rng = np.random.default_rng(4)
+    commands, start = rng.normal(size=(3, 12, 2)), rng.normal(size=(3, 2))
+    shares = np.array([[0.5], [0.9], [1.3]])
+    q, steps = start, []
+    for t in range(12):
+        q = q + shares * (commands[:, t] - q)
+        steps.append(q)
+    as_tensor = [torch.as_tensor(values, dtype=torch.float32) for values in (commands, start)]
+    assert np.allclose(follow(*as_tensor, response(shares, 12)).numpy(), np.stack(steps, axis=1), atol=1e-5)
+
+
 def test_an_untrained_predictor_is_its_base(interface, noisy_streams, rates):
     _, test = noisy_streams
-    shape = TcnShape(3 * interface.n + 1, 16, interface.n)
-    weights = {name: value.detach().numpy() for name, value in _initial(shape, 0).items()}
+    shape = TcnShape(input_count(interface), 16, interface.n)
+    weights = {name: value.detach().numpy() for name, value in initial_weights(shape, 0).items()}
     predictor = Predictor(interface, BaseAlone(interface), weights=weights, channels=16)
     base = play_streams(BaseAlone(interface), test, rates)
     assert np.array_equal(play_streams(predictor, test, rates), base)
@@ -70,7 +76,7 @@ def test_an_untrained_predictor_is_its_base(interface, noisy_streams, rates):
 
 def test_it_beats_the_base_and_the_lead_on_noise_it_has_not_seen(interface, noisy_streams, rates):
     train, test = noisy_streams
-    config = PredictorConfig(iterations=80, rounds=1, batch=16, channels=24)
+    config = PredictorConfig(iterations=80, rounds=1, batch=16, channels=24, averaging=0.9)
     trained = train_predictor(BaseAlone(interface), train, test, rates, config, seed=0)
     learned = trained.history[trained.best].objective
     rivals = [make_rival("lead", interface, strength=strength) for strength in (0.0, 1.0)]
@@ -100,5 +106,22 @@ def test_wrong_weights_and_settings_are_refused(interface):
         Predictor(interface, BaseAlone(interface), weights={})
     with pytest.raises(AgentError, match="rounds need at least"):
         PredictorConfig(iterations=2, rounds=5)
+    with pytest.raises(AgentError, match="averaging"):
+        PredictorConfig(averaging=1.0)
     with pytest.raises(AgentError, match="strength"):
         Lead(interface, BaseAlone(interface), strength=-1.0)
+
+
+def test_a_base_that_looks_at_joint_angles_is_refused(interface, noisy_streams, rates):
+    train, test = noisy_streams
+    with pytest.raises(AgentError, match="cannot stand on 'lead'"):
+        train_predictor(make_rival("lead", interface), train, test, rates)
+
+
+def test_it_sees_the_base_command_beside_that_of_the_agent_below(interface):
+    values = np.random.default_rng(5).normal(size=(4, interface.n))
+    one = network_inputs(interface, values[0], values[1], values[2], values[3], np.array(0.1))
+    other = network_inputs(interface, values[0], values[1], values[2] + 1.0, values[3], np.array(0.1))
+    changed = np.flatnonzero(one != other)
+    assert one.shape == (input_count(interface),)
+    assert changed.tolist() == list(range(2 * interface.n, 3 * interface.n))

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from inspect import signature
+
 import pytest
 from typer.testing import CliRunner
 
+from syda_gym import cli_agents
 from syda_gym.agents.config import ResidualConfig
 from syda_gym.agents.predictor_training import PredictorConfig
 from syda_gym.agents.runner import find_mapping
@@ -78,3 +82,21 @@ def test_the_commands_say_what_they_did_and_errors_in_one_line(trained, tmp_path
         assert runner.invoke(app, [command, "--help"]).exit_code == 0
     wrong = runner.invoke(app, ["train", "--kind", "resdual"])
     assert "did you mean 'residual'" in str(wrong.exception)
+
+
+@pytest.mark.parametrize("command", [cli_agents.train, cli_agents.evaluate, cli_agents.play])
+def test_every_command_takes_the_options_of_a_scene(command):
+    parameters = signature(command).parameters
+    scene = {field.name: field.default for field in fields(cli_agents.Scene)}
+    assert {name: parameters[name].default for name in scene} == scene
+    assert "scene" not in parameters
+
+
+def test_held_out_actions_are_kept_out_of_training_and_played_otherwise():
+    scene = cli_agents.Scene(held_out="wave_high", route="adult>kid>pepper")
+    assert scene.options()["actions"] == ("wave_high",)
+    assert scene.options()["route"] == ("adult", "kid", "pepper")
+    training = scene.options(training=True)
+    assert training["held_out"] == ("wave_high",)
+    assert "wave_high" not in training["actions"]
+    assert len(training["actions"]) > 10

@@ -217,6 +217,7 @@ class _PredictorGraph(_Layer):
             [
                 (command - self.centre) / self.spread,
                 (command - last) / STEP_SCALE,
+                (parts.base - command) / GAP_SCALE,
                 (parts.q - command) / GAP_SCALE,
                 parts.age / AGE_SCALE,
             ],
