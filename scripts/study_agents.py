@@ -60,8 +60,8 @@ class Size:
     validation_episodes: int = 36
     budget: int = 32
     iterations: int = 400
-    steps: int = 400_000
-    test_variants: int = 2
+    steps: int = 300_000
+    test_variants: int = 1
 
 
 SIZES = {"full": Size(), "small": Size(1, 48, 12, 8, 3, 24, 20_000, 1)}
