@@ -46,6 +46,7 @@ VALIDATION = ("swing", "bow")
 TEST = ("cross", "clap", "signal")
 CELLS = ("lag", "noise", "latency", "noise+latency", "full")
 PREDICTED = ("noise", "latency", "noise+latency", "full")
+JITTER_WEIGHT = {"noise": 1.4}  # tuned on validation: with 1 the predictor is 9 % better in error and 15 % in jitter
 PHYSICS_HZ = 60.0
 NAMES = tuple(name for name in RIVALS if name not in CONTACT_RIVALS)
 
@@ -60,7 +61,7 @@ class Size:
     validation_episodes: int = 36
     budget: int = 32
     iterations: int = 400
-    steps: int = 300_000
+    steps: int = 400_000
     test_variants: int = 1
 
 
@@ -199,9 +200,8 @@ def train_predictors(study: Study) -> None:
             streams = study.streams("train", cell, study.size.episodes, seed=1000 + seed)
             judged = study.judged(cell)
             began = time.process_time()
-            trained = train_predictor(
-                lead.base, streams, judged, study.rates, PredictorConfig(iterations=study.size.iterations), seed=seed
-            )
+            config = PredictorConfig(iterations=study.size.iterations, jitter_weight=JITTER_WEIGHT.get(cell, 1.0))
+            trained = train_predictor(lead.base, streams, judged, study.rates, config, seed=seed)
             seconds = round(time.process_time() - began, 1)
             curve = [figures.as_dict() for figures in trained.history]
             _store(study, cell, f"predictor-{seed}", trained.agent, seed, seconds, curve)
