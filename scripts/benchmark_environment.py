@@ -250,6 +250,7 @@ def measure(quick: bool) -> dict[str, Any]:
     """Everything."""
     repeats = 5 if quick else 25
     result: dict[str, Any] = {
+        "bars": BARS,
         "machine": {
             "load": os.getloadavg()[0],
             "cores": os.cpu_count(),
@@ -281,7 +282,7 @@ def table(result: dict[str, Any]) -> str:
         rows.append(
             (f"16 robots, {label}: share of raw physics", f"{result['sixteen'][label]['share_of_raw']:.3f}", many)
         )
-    for count, ratio in result["servo_times_raw"].items():
+    for count, ratio in sorted(result["servo_times_raw"].items(), key=lambda row: int(row[0])):
         bar = f"{BARS['servo_1024_times_raw']}" if count == "1024" else ""
         rows.append((f"servo model, {count} robots: times raw physics at 240 Hz", f"{ratio:.0f}", bar))
     rows.append(("reset [ms]", f"{result['reset_ms']:.3f}", f"{BARS['reset_ms']}"))
