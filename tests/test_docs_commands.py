@@ -28,7 +28,7 @@ PARSED = {
     "syda-gym benchmark study.yaml": "minutes to hours; tests/evaluation/test_benchmark.py",
     "syda-gym compare study other": "needs two benchmarks; tests/evaluation/test_benchmark.py",
     "syda-gym suggest adult kid pepper --pair kid:pepper --benchmark": "needs a benchmark; tests/evaluation",
-    "syda-gym export-episodes": "needs the extra data; tests/evaluation/test_episodes.py",
+    "syda-gym export-episodes": "needs the extra data; tests/evaluation/test_minari_export.py",
     "syda-gym reproduce-paper": "needs the paper's recordings; tests/evaluation/test_paper.py",
     "syda-gym transferability --validate": "minutes; tests/evaluation/test_prediction.py",
     "syda-gym record": "needs a person; tests/teleoperation/test_recording.py",

@@ -1,0 +1,40 @@
+"""Episodes as a Minari data set: what is stored is what was played, and the environment comes back from it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from syda_gym.errors import OptionError, StorageError
+from syda_gym.evaluation.minari_export import export_minari
+
+minari = pytest.importorskip("minari", reason="SKIPPED LOUDLY: exporting needs pip install 'syda-gym[data]'")
+
+NAME = "syda/adult-pepper-v0"
+
+
+def test_episodes_are_stored_and_their_environment_is_made_again(tmp_path, monkeypatch):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    exported = export_minari(NAME, agent="base", episodes=2, seed=3, command="for a test", physics="servo")
+    assert exported.path.is_relative_to(tmp_path)
+    stored = minari.load_dataset(NAME)
+    assert (stored.total_episodes, stored.total_steps) == (exported.episodes, exported.steps)
+    for episode in stored.iterate_episodes():
+        assert len(episode.observations) == len(episode.actions) + 1
+        assert not episode.actions.any(), "the base alone corrects nothing"
+        assert np.isfinite(episode.rewards).all()
+    env = stored.recover_environment()
+    assert env.unwrapped.options.physics == "servo"
+    assert env.observation_space == stored.observation_space
+    env.close()
+    with pytest.raises(StorageError, match="raise its version"):
+        export_minari(NAME, episodes=1)
+
+
+def test_names_and_methods_that_do_not_exist_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    with pytest.raises(OptionError, match="try syda/adult-pepper-v0"):
+        export_minari("no version", episodes=1)
+    with pytest.raises(OptionError, match="did you mean 'syda'"):
+        export_minari(NAME, method="sida", episodes=1)
+    assert not minari.list_local_datasets()
