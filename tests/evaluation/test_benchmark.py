@@ -79,6 +79,7 @@ def computed(small_motions, tmp_path_factory):
         ("methods: ['syda:papr']", OptionError, "did you mean 'paper'"),
         ("agents: [leed]", OptionError, "did you mean 'lead'"),
         ("agents: ['.']", OptionError, "unknown agent '.'"),
+        (f"agents: [{'x' * 5000}]", OptionError, "unknown agent 'xxx"),
         ("motions: 2026-99-99", StorageError, "not valid YAML"),
         ("disturbances: ['teleop:ful']", OptionError, "full"),
         ("seeds: 1000000000000", OptionError, "at most 10000"),

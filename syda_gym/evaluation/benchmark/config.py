@@ -221,11 +221,18 @@ def split_method(text: str) -> tuple[str, str | None]:
     return method, preset or None
 
 
+def _is_bundle(name: str) -> bool:
+    try:
+        return bool(Path(name).name) and Path(name).with_suffix(".safetensors").is_file()
+    except OSError:  # a name longer than the file system takes
+        return False
+
+
 def _check_agent(name: str) -> None:
     from syda_gym.agents.classical import RIVALS
 
     known = [*RIVALS, "residual"]
-    if name in known or (Path(name).name and Path(name).with_suffix(".safetensors").is_file()):
+    if name in known or _is_bundle(name):
         return
     raise OptionError(f"unknown agent {name!r}, and no stored agent of that name; {nearest_name(name, known)}")
 
