@@ -60,6 +60,7 @@ def export_minari(
         StorageError: a data set of that name exists, or it cannot be written.
     """
     try:
+        import jax  # noqa: F401  (Minari's recorder needs it)
         import minari
         from minari.dataset.minari_dataset import parse_dataset_id
     except ImportError as error:

@@ -8,7 +8,9 @@ import pytest
 from syda_gym.errors import OptionError, StorageError
 from syda_gym.evaluation.minari_export import export_minari
 
-minari = pytest.importorskip("minari", reason="SKIPPED LOUDLY: exporting needs pip install 'syda-gym[data]'")
+NEEDED = "SKIPPED LOUDLY: exporting needs pip install 'syda-gym[data]'"
+minari = pytest.importorskip("minari", reason=NEEDED)
+pytest.importorskip("jax", reason=NEEDED)  # Minari's recorder needs it
 
 NAME = "syda/adult-pepper-v0"
 
