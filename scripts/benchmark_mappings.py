@@ -3,7 +3,9 @@
 All figures are ratios or processor times of one run on one thread, so that a busy machine disturbs them little::
 
     python scripts/benchmark_mappings.py                        # embedded motions
-    python scripts/benchmark_mappings.py --motions paper:DIR --study
+    python scripts/benchmark_mappings.py --motions paper:DIR --out docs/results/mappings.json
+
+How long ``reproduce-paper`` takes stands in the ``study.json`` that it writes.
 """
 
 from __future__ import annotations
@@ -15,16 +17,19 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
 import statistics
-import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
 from syda_gym.embodiments import landmark_error
+from syda_gym.files import write_json
 from syda_gym.mappings import fit
+from syda_gym.mappings.card import versions
 from syda_gym.mappings.coded import CodedMapping
 from syda_gym.mappings.mink_ik import MinkArmCoder
+from syda_gym.motions.clip import PairedMotions
 from syda_gym.motions.loading import load_motions, resampled
 
 FRAMES = 150
@@ -32,31 +37,35 @@ ROUNDS = 7
 
 
 def main() -> None:
-    """Runs the benchmark and prints a table."""
+    """Runs the benchmark, prints a table and writes it if asked to."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--motions", default="embedded")
-    parser.add_argument("--study", action="store_true", help="also time reproduce-paper with 10 seeds (minutes)")
+    parser.add_argument("--out", type=Path, help="JSON file for the figures")
     arguments = parser.parse_args()
     motions = load_motions(arguments.motions)
     if any(take.fps > 10.0 for take in motions.takes):
         motions = resampled(motions, 10.0)
     pair = motions.pair("adult", "pepper")
-    _fits(pair)
-    mapping = fit(pair, confidence=False)
-    _single_frames(mapping, pair.source[:FRAMES])
-    if arguments.study:
-        _study(arguments.motions)
+    found = {"frames": len(pair), **_fits(pair)}
+    found |= _single_frames(fit(pair, confidence=False), pair.source[:FRAMES])
+    for name, value in found.items():
+        print(f"{name:40s} {value:10.4g}")
+    if arguments.out:
+        write_json(arguments.out, {"motions": motions.name, "figures": found, "versions": versions()})
 
 
-def _fits(pair: object) -> None:
-    fit(pair, epochs=1)  # type: ignore[arg-type]  # imports torch and warms it up
-    for preset, options in (("general", {}), ("general", {"confidence": False}), ("accurate", {"confidence": False})):
-        seconds = _processor_time(lambda p=preset, o=options: fit(pair, preset=p, **o))  # type: ignore[misc,arg-type]
-        note = " without error bound" if options else " with error bound"
-        print(f"fit {preset:9s}{note:22s} {seconds:8.2f} s")
+def _fits(pair: PairedMotions) -> dict[str, float]:
+    fit(pair, epochs=1)  # imports torch and warms it up
+    variants = {
+        "fit general with error bound [s]": {"preset": "general"},
+        "fit general [s]": {"preset": "general", "confidence": False},
+        "fit nested [s]": {"preset": "nested", "confidence": False},
+        "fit accurate [s]": {"preset": "accurate", "confidence": False},
+    }
+    return {name: _processor_time(lambda o=options: fit(pair, **o)) for name, options in variants.items()}  # type: ignore[misc]
 
 
-def _single_frames(mapping: CodedMapping, frames: np.ndarray) -> None:
+def _single_frames(mapping: CodedMapping, frames: np.ndarray) -> dict[str, float]:
     coder = mapping.target_coder
     slow = CodedMapping(
         mapping.card,
@@ -64,29 +73,18 @@ def _single_frames(mapping: CodedMapping, frames: np.ndarray) -> None:
         MinkArmCoder(mapping.target, coder.settings(), coder.arrays()),
         mapping.regressor,
     )
-    ours, theirs, network = [], [], []
+    ours, theirs = [], []
     for _ in range(ROUNDS):  # in turns, so that both meet the same neighbours on the machine
         ours.append(_processor_time(lambda: [mapping(frame) for frame in frames]) / len(frames))
         theirs.append(_processor_time(lambda: slow(frames)) / len(frames))
-        codes = mapping.source_coder.encode(frames)[:, None]
-        network.append(_processor_time(lambda c=codes: [mapping.regressor(x) for x in c]) / len(frames))  # type: ignore[misc]
     apart = landmark_error(mapping.target, slow(frames), mapping(frames)).mean()
-    a, b, c = (statistics.median(values) for values in (ours, theirs, network))
-    print(f"one frame, encoder, network and closed-form inverse kinematics: {1e6 * a:8.0f} us")
-    print(f"of which the network in numpy:                                 {1e6 * c:8.0f} us")
-    print(f"one frame of a sequence, the same targets by mink:             {1e6 * b:8.0f} us")
-    print(f"ratio {b / a:.1f}; the two differ by {1000 * apart:.2f} mm on average")
-
-
-def _study(spec: str) -> None:
-    from syda_gym.evaluation.paper import reproduce
-
-    with tempfile.TemporaryDirectory() as folder:
-        start = time.perf_counter()
-        study = reproduce(spec, folder, seeds=10, workers=2)
-        wall = time.perf_counter() - start
-    busy = sum(cell.seconds for cell in study.cells.values())
-    print(f"reproduce-paper, 10 seeds, 2 processes: {wall / 60:.1f} min ({busy / 60:.1f} min of processor time)")
+    a, b = statistics.median(ours), statistics.median(theirs)
+    return {
+        "one frame [us]": 1e6 * a,
+        "one frame by mink [us]": 1e6 * b,
+        "times mink": b / a,
+        "difference to mink [mm]": 1e3 * float(apart),
+    }
 
 
 def _processor_time(work: Callable[[], object]) -> float:

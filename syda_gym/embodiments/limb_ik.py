@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import product
 
@@ -13,6 +12,7 @@ from syda_gym.embodiments.arm_chain import ArmChain
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.limb_ik_single import SingleArmIK
 from syda_gym.embodiments.robot import Robot
+from syda_gym.embodiments.two_turns import Vector
 from syda_gym.errors import EmbodimentError
 
 __all__ = ["LimbIK"]
@@ -67,28 +67,28 @@ class LimbIK:
             raise EmbodimentError(f"directions for {self.robot.name!r} must be finite and longer than zero")
         unit = wanted / norms
         if len(unit) == 1 and self._single:
-            return self.solve_frame(unit[0].tolist())[None]
+            return np.array([self.solve_frame([(tuple(a), tuple(b)) for a, b in unit[0].tolist()])])
         frames = np.repeat(self.robot.rest[None], len(unit), axis=0)
         for index, arm in enumerate(self._arms):
             frames = arm.solve(frames, unit[:, index])
         return frames
 
-    def solve_frame(self, directions: Sequence[Sequence[Sequence[float]]]) -> FloatArray:
+    def solve_frame(self, directions: Sequence[tuple[Vector, Vector]]) -> list[float]:
         """The same for one frame, without numpy's overhead where the arms allow it.
 
         Args:
-            directions: arms, limbs, xyz as nested sequences of floats; finite and longer than zero.
+            directions: arms, limbs, xyz: unit vectors as nested sequences of floats.
 
         Returns:
-            One frame ``(n,)`` [rad].
+            The angles of one frame [rad].
         """
         if not self._single:
-            whole: FloatArray = self.solve(np.array([directions]))[0]
+            whole: list[float] = self.solve(np.array([directions]))[0].tolist()
             return whole
         angles: list[float] = []
         for single, (upper, fore) in zip(self._single, directions, strict=True):
-            angles += single.solve(_unit_vector(upper), _unit_vector(fore))
-        return np.array(angles)
+            angles += single.solve(upper, fore)
+        return angles
 
 
 class _ArmIK:
@@ -281,12 +281,6 @@ def _into_range(angle: FloatArray, lower: float, upper: float) -> FloatArray:
     middle = 0.5 * (lower + upper)
     nearest: FloatArray = middle + (angle - middle + np.pi) % (2.0 * np.pi) - np.pi
     return nearest
-
-
-def _unit_vector(vector: Sequence[float]) -> tuple[float, float, float]:
-    x, y, z = vector
-    norm = math.sqrt(x * x + y * y + z * z)
-    return x / norm, y / norm, z / norm
 
 
 def _unit(vector: FloatArray) -> FloatArray:

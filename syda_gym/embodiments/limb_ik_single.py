@@ -14,15 +14,16 @@ import numpy as np
 from syda_gym.embodiments.arm_chain import ArmChain
 from syda_gym.embodiments.coupled import coupled_range
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.two_turns import TwoTurns, Vector, turned_back
 
 __all__ = ["EXACT", "FLAT", "STEPS", "SingleArmIK"]
 
-Vector = tuple[float, float, float]
 Swept = tuple[list[Vector], list[Vector], list[Vector]]
 Couplings = Sequence[tuple[int, int, FloatArray, FloatArray, FloatArray]]
 
 EXACT = 1e-7  # m, as in limb_ik
 STEPS = 60
+_TURN = 2.0 * math.pi
 FLAT = 1e-16  # m^4/rad^2; with a squared slope below this no step gains anything
 
 
@@ -55,12 +56,19 @@ class SingleArmIK:
         self.lower: list[float] = chain.lower.tolist()
         self.upper: list[float] = chain.upper.tolist()
         self.middle = [0.5 * (low + high) for low, high in zip(self.lower, self.upper, strict=True)]
+        # Per mover: where a whole turn about mid-range starts, the limits, and the angle at rest.
+        self._windows = [
+            ((self.middle[j] - math.pi, self.lower[j], self.upper[j]), self.rest[j]) for j in self.movers
+        ]
         self.axes: list[Vector] = [tuple(axis) for axis in axes.tolist()]
-        self.upper_zero: Vector = tuple(zero[0].tolist())
-        self.fore_zero: Vector = tuple(zero[1].tolist())
         self.couplings = [(j, by, at.tolist(), low.tolist(), high.tolist()) for j, by, at, low, high in couplings]
         self.carriers = chain.point_joints[:3]
         self._plan = _plan(chain, axes)
+        self._first, self._second, third, fourth = (self.axes[joint] for joint in self.movers)
+        self.upper_zero: Vector = tuple(zero[0].tolist())
+        self.fore_zero: Vector = tuple(zero[1].tolist())
+        self._to_elbow = TwoTurns(self._first, self._second, self.upper_zero)
+        self._to_wrist = TwoTurns(third, fourth, self.fore_zero)
         self.exact = self._is_exact()
 
     def solve(self, upper: Vector, fore: Vector) -> list[float]:
@@ -87,32 +95,35 @@ class SingleArmIK:
 
     def _solved(self, upper: Vector, fore: Vector) -> list[float] | None:
         """Of the closed-form solutions within the limits the one nearest to rest; most frames need nothing else."""
-        w0, w1, w2, w3 = (self.axes[joint] for joint in self.movers)
-        j0, j1, j2, j3 = self.movers
+        (w0, r0), (w1, r1), (w2, r2), (w3, r3) = self._windows
+        real, elbows = self._to_elbow.solve(upper)
         best, least = None, math.inf
-        for first in (1.0, -1.0):
-            a0, a1, real = _subproblem_two(w0, w1, self.upper_zero, upper, first)
-            b0, b1 = self._wrapped(j0, a0), self._wrapped(j1, a1)
-            if not real or b0 is None or b1 is None:
+        for a0, a1 in elbows if real else ():
+            b0, b1 = _wrapped(a0, w0), _wrapped(a1, w1)
+            if b0 is None or b1 is None:
                 continue
-            turned = _turned(w1, -a1, _turned(w0, -a0, fore))
-            for second in (1.0, -1.0):
-                a2, a3, real = _subproblem_two(w2, w3, self.fore_zero, turned, second)
-                b2, b3 = self._wrapped(j2, a2), self._wrapped(j3, a3)
-                if not real or b2 is None or b3 is None:
+            real, wrists = self._to_wrist.solve(turned_back(self._first, self._second, b0, b1, fore))
+            for a2, a3 in wrists if real else ():
+                b2, b3 = _wrapped(a2, w2), _wrapped(a3, w3)
+                if b2 is None or b3 is None:
                     continue
-                angles = self.rest.copy()
-                angles[j0], angles[j1], angles[j2], angles[j3] = b0, b1, b2, b3
-                pull = self._pull(angles)
-                if pull < least and (not self.couplings or self._clamped(angles) == angles):
-                    best, least = angles, pull
+                # Among equally good solutions the nearest to rest, as the pull of the other candidates has it.
+                pull = abs(b0 - r0) + abs(b1 - r1) + abs(b2 - r2) + abs(b3 - r3)
+                if pull < least:
+                    angles = self.rest.copy()
+                    for joint, angle in zip(self.movers, (b0, b1, b2, b3), strict=True):
+                        angles[joint] = angle
+                    if self._within_couplings(angles):
+                        best, least = angles, pull
         return best
 
-    def _wrapped(self, joint: int, angle: float) -> float | None:
-        """The angle by whole turns in the joint's range; ``None`` if there is no such."""
-        middle = self.middle[joint]
-        angle = middle + (angle - middle + math.pi) % (2.0 * math.pi) - math.pi
-        return angle if self.lower[joint] <= angle <= self.upper[joint] else None
+    def _within_couplings(self, angles: list[float]) -> bool:
+        """Whether angles within their own limits obey the coupled ones too."""
+        for joint, by, at, low, high in self.couplings:
+            least, most = coupled_range(angles[by], at, low, high)
+            if not least <= angles[joint] <= most:
+                return False
+        return True
 
     def _is_exact(self) -> bool:
         """Whether the closed form leaves no error: the last two movers then turn the forearm about the elbow."""
@@ -132,19 +143,14 @@ class SingleArmIK:
 
     def _candidates(self, upper: Vector, fore: Vector) -> list[tuple[list[float], bool]]:
         """The four solutions without regard to limits, and whether each is one rather than the nearest to one."""
-        w0, w1, w2, w3 = (self.axes[joint] for joint in self.movers)
-        j0, j1, j2, j3 = self.movers
         found = []
-        for first in (1.0, -1.0):
-            a0, a1, real_upper = _subproblem_two(w0, w1, self.upper_zero, upper, first)
-            turned = _turned(w1, -a1, _turned(w0, -a0, fore))
-            for second in (1.0, -1.0):
-                a2, a3, real_fore = _subproblem_two(w2, w3, self.fore_zero, turned, second)
+        real_upper, elbows = self._to_elbow.solve(upper)
+        for a0, a1 in elbows:
+            real_fore, wrists = self._to_wrist.solve(turned_back(self._first, self._second, a0, a1, fore))
+            for a2, a3 in wrists:
                 angles = self.rest.copy()
-                angles[j0], angles[j1], angles[j2], angles[j3] = a0, a1, a2, a3
-                for joint in self.movers:
-                    middle = self.middle[joint]
-                    angles[joint] = middle + (angles[joint] - middle + math.pi) % (2.0 * math.pi) - math.pi
+                for joint, angle, ((lowest, _, _), _) in zip(self.movers, (a0, a1, a2, a3), self._windows, strict=True):
+                    angles[joint] = lowest + (angle - lowest) % _TURN
                 found.append((angles, real_upper and real_fore))
         return found
 
@@ -351,49 +357,11 @@ def _damped_step(columns: list[tuple[float, ...]], gradient: list[float], dampin
     return step
 
 
-def _subproblem_two(
-    first: Vector, second: Vector, start: Vector, goal: Vector, sign: float
-) -> tuple[float, float, bool]:
-    """Angles with R(first, a) R(second, b) start = goal (Murray et al., 3.2), and whether there is a solution.
-
-    Without one, the angles bring ``start`` as near to ``goal`` as the axes allow.
-    """
-    c = _dot(first, second)
-    across = _cross(first, second)
-    span = _dot(across, across)
-    along_second, along_first = _dot(second, start), _dot(goal, first)
-    alpha = (along_first - c * along_second) / span
-    beta = (along_second - c * along_first) / span
-    square = (1.0 - alpha * alpha - beta * beta - 2.0 * alpha * beta * c) / span
-    gamma = sign * math.sqrt(max(square, 0.0))
-    middle = (
-        alpha * first[0] + beta * second[0] + gamma * across[0],
-        alpha * first[1] + beta * second[1] + gamma * across[1],
-        alpha * first[2] + beta * second[2] + gamma * across[2],
-    )
-    return _angle_about(first, middle, goal), _angle_about(second, start, middle), square >= 0.0
-
-
-def _angle_about(axis: Vector, start: Vector, goal: Vector) -> float:
-    """Angle about ``axis`` that turns ``start`` towards ``goal``."""
-    along, other = _dot(start, axis), _dot(goal, axis)
-    return math.atan2(_dot(_cross(start, goal), axis), _dot(start, goal) - along * other)
-
-
-def _turned(axis: Vector, angle: float, vector: Vector) -> Vector:
-    """Rotates ``vector`` about ``axis``."""
-    c, s = math.cos(angle), math.sin(angle)
-    along = _dot(axis, vector) * (1.0 - c)
-    x, y, z = _cross(axis, vector)
-    return (
-        vector[0] * c + x * s + axis[0] * along,
-        vector[1] * c + y * s + axis[1] * along,
-        vector[2] * c + z * s + axis[2] * along,
-    )
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def _wrapped(angle: float, window: tuple[float, float, float]) -> float | None:
+    """The angle by whole turns within the limits; ``None`` if there is no such."""
+    lowest, lower, upper = window
+    angle = lowest + (angle - lowest) % _TURN
+    return angle if lower <= angle <= upper else None
 
 
 def _dot6(a: tuple[float, ...], b: tuple[float, ...]) -> float:

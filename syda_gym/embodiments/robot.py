@@ -227,18 +227,23 @@ class Robot(Embodiment):
     def clamp(self, frames: ArrayLike) -> FloatArray:
         """Nearest frames within the joint limits, coupled limits included (the governing joint is clamped first)."""
         if np.size(frames) == len(self.joint_names):
-            return np.array([self._clamped(np.asarray(frames, dtype=np.float64).ravel().tolist())])
+            return np.array([self.clamp_one(np.asarray(frames, dtype=np.float64).ravel().tolist())])
         q = np.clip(np.atleast_2d(np.asarray(frames, dtype=np.float64)), self.lower, self.upper)
         lower, upper = self.limits_at(q)
         return np.clip(q, lower, upper)
 
-    def _clamped(self, angles: list[float]) -> list[float]:
-        """``clamp`` for one frame in plain floats, which live teleoperation does several times a frame."""
+    def clamp_one(self, angles: list[float]) -> list[float]:
+        """``clamp`` for one frame ``(n,)`` in plain floats, which live use does for every frame."""
         lower, upper, couplings = self._plain_limits
-        inside = [min(max(a, low), high) for a, low, high in zip(angles, lower, upper, strict=True)]
+        # Comparisons instead of min and max: calls are most of the cost here.
+        inside = [
+            low if a < low else high if a > high else a for a, low, high in zip(angles, lower, upper, strict=True)
+        ]
+        if not couplings:
+            return inside
         result = inside.copy()
-        for joint, by, at, low, high in couplings:
-            least, most = coupled_range(inside[by], at, low, high)
+        for joint, by, at, low_rows, high_rows in couplings:
+            least, most = coupled_range(inside[by], at, low_rows, high_rows)
             result[joint] = min(max(result[joint], lower[joint], least), upper[joint], most)
         return result
 

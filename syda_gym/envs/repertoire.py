@@ -19,7 +19,7 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.envs.disturbances import freeze_elbow_yaw
 from syda_gym.envs.options import TeleopOptions
 from syda_gym.envs.pilot import Pilot, PlannedRoute
-from syda_gym.errors import EmbodimentError, MotionError, OptionError, RouteError, nearest_name
+from syda_gym.errors import EmbodimentError, MappingError, MotionError, OptionError, RouteError, nearest_name
 from syda_gym.mappings.limits import limit_speed, step_towards
 from syda_gym.motions.clip import MotionClip, Motions, Take
 from syda_gym.motions.loading import load_motions, resampled
@@ -112,6 +112,11 @@ class Repertoire:
     def map(self, route: int, frames: FloatArray) -> FloatArray:
         """Operator frames ``(N, F)`` to joint angles ``(N, n)`` [rad] along a route, within the joint limits."""
         mapping = self.pilot.mapping(self.routes[route].bodies)
+        if mapping.window:
+            raise MappingError(
+                f"{mapping!r} looks at {mapping.window} past frames; the environment maps single frames: fit without "
+                "window, or use mapping.stream.FrameStream in a loop of your own"
+            )
         return self.robot.clamp(mapping(frames))
 
     def limited(self, commands: FloatArray) -> FloatArray:

@@ -1,29 +1,26 @@
 """The paper's study again: every method, three protocols, many seeds, beside the printed figures.
 
-A *cell* is one method under one protocol for one human. Cells are computed in separate processes and kept as small JSON
-files, so that an interrupted study goes on where it stopped.
+The study consists of *parts*: cells (one method under one protocol for one human) and two further tables, few
+recordings and causal windows. Parts are computed in separate processes and kept as small JSON files, so that an
+interrupted study goes on where it stopped.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-import numpy as np
-
-from syda_gym.embodiments import landmark_error
-from syda_gym.errors import MappingError, MissingExtraError, MotionError, OptionError, StorageError
+from syda_gym.errors import MotionError, OptionError, StorageError
+from syda_gym.evaluation.paper_cells import CONTENDERS, HUMANS, ROBOT, Cell, CellTask, Contender
+from syda_gym.evaluation.paper_extras import FewShotTask, WindowTask
 from syda_gym.files import fingerprint, read_json, write_json
 from syda_gym.mappings.card import versions
-from syda_gym.mappings.fitting import fit_many
-from syda_gym.mappings.mapping import Mapping
-from syda_gym.mappings.validation import Fold, Validation, fit_folds, held_out_errors
-from syda_gym.motions.clip import PROTOCOLS, Motions, PairedMotions
+from syda_gym.motions.clip import PROTOCOLS, Motions
 from syda_gym.motions.loading import load_motions
 
 __all__ = ["CONTENDERS", "Cell", "Contender", "Study", "paper_transferability", "reproduce"]
@@ -31,109 +28,43 @@ __all__ = ["CONTENDERS", "Cell", "Contender", "Study", "paper_transferability", 
 Progress = Callable[[float, str], None]
 """Told the finished fraction and what was finished."""
 
-HUMANS = ("adult", "kid")
-ROBOT = "pepper"
-_OTHER = {"adult": "kid", "kid": "adult"}
-_FORMAT = 1
+_FORMAT = 2
 
 
-@dataclass(frozen=True)
-class Contender:
-    """A method and preset of the study.
-
-    Attributes:
-        method: of ``mappings.METHODS``.
-        preset: of the method.
-        seeded: whether the fit itself is random; otherwise seeds only matter for random splits.
-        bounds: in how many seeds the error bound is checked (leave-one-action-out only).
-        slow: whether to leave it out of a quick study.
-    """
-
-    method: str
-    preset: str
-    seeded: bool = True
-    bounds: int = 0
-    slow: bool = False
+class Task(Protocol):
+    """A part of the study that a process of its own can compute."""
 
     @property
     def name(self) -> str:
-        """``method/preset``."""
-        return f"{self.method}/{self.preset}"
+        """For progress and files."""
 
+    @property
+    def cost(self) -> float:
+        """Relative time."""
 
-CONTENDERS = (
-    Contender("syda", "general", bounds=2),
-    Contender("syda", "accurate", bounds=1),
-    Contender("syda", "paper"),
-    Contender("direct", "paper"),
-    Contender("syda", "interpolation", slow=True),
-    Contender("direct", "general"),
-    Contender("ridge", "general", seeded=False, bounds=1),
-    Contender("kernel_ridge", "general", seeded=False),
-    Contender("nearest", "general", seeded=False),
-    Contender("geometric", "procrustes", seeded=False),
-    Contender("geometric", "fixed", seeded=False),
-    Contender("mink", "procrustes", seeded=False),
-)
-"""Every method of the study, the most telling first."""
-
-
-@dataclass(frozen=True)
-class Cell:
-    """Figures of one method under one protocol for one human; lists run over seeds.
-
-    Attributes:
-        contender: ``method/preset``.
-        protocol: ``rand3``, ``twin3`` or ``loao``.
-        human: ``adult`` or ``kid``.
-        error: human to robot [m].
-        error_back: robot to human [m]; empty if the method does not map back.
-        chain: other human to this one to the robot, scored on the other's own pairing [m]; empty if there is none.
-        chain_joints: per seed the mean of each landmark of the chain [m], as ``landmark_names`` of the robot.
-        chain_spread: per seed the standard deviation over frames of each landmark of the chain [m].
-        actions: action to mean error human to robot [m].
-        limit_violations: share of joint angles beyond the limits before they are enforced.
-        speed_violations: share of joint steps beyond the speed limits; ``None`` where clips are not held out whole.
-        aligned: human to robot after the best shift of every test recording (an oracle) [m].
-        bound: mean error bound [m], ``None`` if not checked.
-        covered: share of frames within the bound.
-        covered_worst: the same of the worst action.
-        seconds: processor time.
-    """
-
-    contender: str
-    protocol: str
-    human: str
-    error: list[float]
-    error_back: list[float] = field(default_factory=list)
-    chain: list[float] = field(default_factory=list)
-    chain_joints: list[list[float]] = field(default_factory=list)
-    chain_spread: list[list[float]] = field(default_factory=list)
-    actions: dict[str, float] = field(default_factory=dict)
-    limit_violations: float = 0.0
-    speed_violations: float | None = None
-    aligned: list[float] = field(default_factory=list)
-    bound: float | None = None
-    covered: float | None = None
-    covered_worst: float | None = None
-    seconds: float = 0.0
+    def compute(self) -> dict[str, Any] | str:
+        """JSON-able figures, or why there are none."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """All cells that could be computed.
+    """All parts that could be computed.
 
     Attributes:
         data: name of the data set.
         seeds: how many.
         cells: by contender, protocol and human.
-        skipped: contender to the reason why it is missing.
+        few_shot: newcomer to rows of ``few_shot.FewShotRow`` as dictionaries; empty in a partial study.
+        windows: human to rows of ``windows.WindowRow`` as dictionaries; empty in a partial study.
+        skipped: part to the reason why it is missing.
     """
 
     data: str
     seeds: int
     cells: dict[tuple[str, str, str], Cell]
-    skipped: dict[str, str]
+    few_shot: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    windows: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    skipped: dict[str, str] = field(default_factory=dict)
 
     def cell(self, contender: str, protocol: str, human: str) -> Cell | None:
         """One cell, ``None`` if there is none."""
@@ -154,13 +85,14 @@ def reproduce(
 
     Args:
         motions: ``paper:DIR``, or any motions with adult, kid and pepper recorded in pairs.
-        out: folder for tables, plots and the finished cells (by which an interrupted study is resumed); nothing is
+        out: folder for tables, plots and the finished parts (by which an interrupted study is resumed); nothing is
             written if ``None``.
         seeds: of splits and networks.
         protocols: some of ``rand3``, ``twin3``, ``loao``.
-        contenders: names ``method/preset`` out of ``CONTENDERS``; all by default.
+        contenders: names ``method/preset`` out of ``CONTENDERS``; by default all, and the tables of few recordings and
+            causal windows.
         workers: processes; each uses one thread.
-        progress: told the finished fraction and the last finished cell.
+        progress: told the finished fraction and the last finished part.
 
     Returns:
         The study.
@@ -178,30 +110,31 @@ def reproduce(
     spec = os.fspath(motions)
     loaded = load_motions(spec)
     mark = _check(loaded)
-    tasks = [
-        (spec, contender, protocol, human, seeds) for protocol in protocols for contender in chosen for human in HUMANS
+    tasks: list[Task] = [
+        CellTask(spec, contender, protocol, human, seeds)
+        for protocol in protocols
+        for contender in chosen
+        for human in HUMANS
     ]
-    cells: dict[tuple[str, str, str], Cell] = {}
-    skipped: dict[str, str] = {}
+    if contenders is None and "loao" in protocols:
+        tasks += [kind(spec, human, seeds) for kind in (FewShotTask, WindowTask) for human in HUMANS]
+    study = Study(loaded.name, seeds, {})
     todo = []
     for task in tasks:
-        found = _read_cell(_cell_path(out, mark, task)) if out is not None else None
-        if found is None:
+        found = _read_part(_part_path(out, mark, task, seeds)) if out is not None else None
+        if found is None or not _add(study, task, found):
             todo.append(task)
-        else:
-            cells[found.contender, found.protocol, found.human] = found
     done = len(tasks) - len(todo)
-    for task, result in _computed(todo, workers):
+    for task, result in _computed(sorted(todo, key=lambda task: -task.cost), workers):
         done += 1
         if isinstance(result, str):
-            skipped[task[1].name] = result
+            study.skipped[task.name] = result
         else:
-            cells[result.contender, result.protocol, result.human] = result
+            _add(study, task, result)
             if out is not None:
-                write_json(_cell_path(out, mark, task), {"format": _FORMAT, **asdict(result)})
+                write_json(_part_path(out, mark, task, seeds), {"format": _FORMAT, "part": result})
         if progress is not None:
-            progress(done / len(tasks), f"{task[1].name} {task[2]} {task[3]}")
-    study = Study(loaded.name, seeds, cells, skipped)
+            progress(done / len(tasks), task.name)
     if out is not None:
         from syda_gym.evaluation.paper_report import write_study
 
@@ -209,108 +142,31 @@ def reproduce(
     return study
 
 
-Task = tuple[str, Contender, str, str, int]
-
-
-def _computed(tasks: Sequence[Task], workers: int) -> Any:
-    """Yields tasks with their cells (or why there is none) as they finish."""
+def _computed(tasks: Sequence[Task], workers: int) -> Iterator[tuple[Task, dict[str, Any] | str]]:
+    """Yields tasks with their figures (or why there are none) as they finish."""
     if workers == 1 or len(tasks) <= 1:
         for task in tasks:
-            yield task, compute_cell(task)
+            yield task, task.compute()
         return
     with ProcessPoolExecutor(min(workers, len(tasks)), mp_context=get_context("spawn")) as pool:
-        waiting = {pool.submit(compute_cell, task): task for task in tasks}
+        waiting = {pool.submit(task.compute): task for task in tasks}
         for future in as_completed(waiting):
             yield waiting[future], future.result()
 
 
-def compute_cell(task: Task) -> Cell | str:
-    """Computes one cell; a missing optional dependency gives its message instead."""
-    import time
-
-    import torch
-
-    spec, contender, protocol, human, seeds = task
-    torch.set_num_threads(1)
-    start = time.process_time()
-    motions = load_motions(spec)
-    pair = motions.pair(human, ROBOT)
-    numbers = range(seeds if contender.seeded or protocol != "loao" else 1)
-    options: dict[str, Any] = {} if contender.preset == "paper" else {"confidence": False}
+def _add(study: Study, task: Task, part: dict[str, Any]) -> bool:
+    """Puts a part in its place; ``False`` if it does not have the expected fields."""
     try:
-        folds = fit_folds(pair, contender.method, contender.preset, protocol=protocol, seeds=numbers, **options)
-    except MissingExtraError as error:
-        return str(error)
-    scores = held_out_errors(pair, folds, protocol)
-    chain = _chain_errors(motions, contender, protocol, human, folds, numbers)
-    bound = _bounds(pair, contender) if contender.bounds and protocol == "loao" else None
-    return Cell(
-        contender=contender.name,
-        protocol=protocol,
-        human=human,
-        error=scores.means.tolist(),
-        error_back=[] if scores.errors_back is None else scores.errors_back.mean(axis=(1, 2)).tolist(),
-        chain=[float(errors.mean()) for errors in chain],
-        chain_joints=[errors.mean(axis=0).tolist() for errors in chain],
-        chain_spread=[errors.std(axis=0).tolist() for errors in chain],
-        actions=scores.per_action(),
-        limit_violations=scores.limit_violations,
-        speed_violations=scores.speed_violations,
-        aligned=[] if scores.aligned is None else scores.aligned.tolist(),
-        bound=None if bound is None or bound.bounds is None else float(bound.bounds.mean()),
-        covered=None if bound is None or bound.covered is None else float(bound.covered.mean()),
-        covered_worst=None
-        if bound is None or bound.covered is None
-        else min(bound.per_action(bound.covered.astype(np.float64)).values()),
-        seconds=time.process_time() - start,
-    )
-
-
-def _bounds(pair: PairedMotions, contender: Contender) -> Validation:
-    """Checks the error bound: every fold holds its own training actions out once more."""
-    folds = fit_folds(
-        pair, contender.method, contender.preset, protocol="loao", seeds=range(contender.bounds), back=False
-    )
-    return held_out_errors(pair, folds, "loao")
-
-
-def _chain_errors(
-    motions: Motions, contender: Contender, protocol: str, human: str, folds: Sequence[Fold], seeds: Sequence[int]
-) -> list[np.ndarray[Any, np.dtype[np.float64]]]:
-    """Per seed the errors of other human > human > robot on all rows of the other human's pairing with the robot.
-
-    That pairing was never fitted. In leave-one-action-out the link into the robot is the one without the row's action;
-    otherwise, as in the paper, it is fitted to all rows.
-    """
-    if protocol == "twin3":
-        return []
-    other = _OTHER[human]
-    end, pair = motions.pair(other, ROBOT), motions.pair(human, ROBOT)
-    options: dict[str, Any] = {} if contender.preset == "paper" else {"confidence": False}
-    count = len(list(seeds))
-    try:
-        hops = fit_many(
-            [motions.pair(other, human)] * count, contender.method, contender.preset, list(seeds), **options
-        )
-    except MappingError:
-        return []  # this method does not reach humans
-    result = []
-    if protocol == "rand3":
-        links = fit_many([pair] * count, contender.method, contender.preset, list(seeds), **options)
-        for hop, whole in zip(hops, links, strict=True):
-            result.append(landmark_error(end.target_body, (hop >> whole)(end.source), end.target))
-        return result
-    for seed, hop in zip(seeds, hops, strict=True):
-        links_by_action: dict[str, Mapping] = {
-            fold.test.action_names[0]: fold.mapping for fold in folds if fold.seed == seed
-        }
-        parts = []
-        for action, link in links_by_action.items():
-            if action in end.action_names:
-                rows = end.only_actions([action])
-                parts.append(landmark_error(rows.target_body, (hop >> link)(rows.source), rows.target))
-        result.append(np.concatenate(parts))
-    return result
+        if isinstance(task, FewShotTask):
+            study.few_shot[task.newcomer] = part["rows"]
+        elif isinstance(task, WindowTask):
+            study.windows[task.human] = part["rows"]
+        else:
+            cell = Cell(**part)
+            study.cells[cell.contender, cell.protocol, cell.human] = cell
+    except (TypeError, KeyError):
+        return False
+    return True
 
 
 def paper_transferability() -> dict[str, dict[str, float]]:
@@ -347,19 +203,20 @@ def _check(motions: Motions) -> str:
     return fingerprint(*(pair.fingerprint for pair in pairs))
 
 
-def _cell_path(out: str | os.PathLike[str], mark: str, task: Task) -> Path:
-    _, contender, protocol, human, seeds = task
-    name = f"{contender.name.replace('/', '-')}-{protocol}-{human}-{seeds}-{mark[:8]}.json"
-    return Path(out) / "cells" / name
+def _part_path(out: str | os.PathLike[str], mark: str, task: Task, seeds: int) -> Path:
+    name = task.name.replace("/", "-").replace(" ", "-")
+    return Path(out) / "cells" / f"{name}-{seeds}-{mark[:8]}.json"
 
 
-def _read_cell(path: Path) -> Cell | None:
+def _read_part(path: Path) -> dict[str, Any] | None:
+    """A part that an earlier run left; anything unreadable is computed again, the file is only a cache."""
     if not path.is_file():
         return None
     try:
         values = read_json(path)
-        if values.pop("format") != _FORMAT:
-            return None
-        return Cell(**values)
-    except (StorageError, TypeError, KeyError, AttributeError):
-        return None  # computed again; the file is only a cache
+    except StorageError:
+        return None
+    if not isinstance(values, dict) or values.get("format") != _FORMAT or not isinstance(values.get("part"), dict):
+        return None
+    part: dict[str, Any] = values["part"]
+    return part

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from syda_gym.evaluation.paper import CONTENDERS, Cell, Study, paper_transferability
+from syda_gym.evaluation.paper import Study, paper_transferability
+from syda_gym.evaluation.paper_cells import CONTENDERS, Cell
 from syda_gym.evaluation.report.model import Column, Table
 from syda_gym.files import atomic_path, write_json, write_text
 
@@ -55,11 +56,12 @@ _JOINTS = ("R elbow", "R wrist", "L elbow", "L wrist")
 
 
 def tables(study: Study) -> list[Table]:
-    """Tables 2 to 5 and the overview of every protocol."""
+    """Tables 2 to 5, the overview of every protocol, few recordings and causal windows."""
     t = paper_transferability()
     found = [_table2(study, t), _chain_table(study, "table3"), _chain_table(study, "table4"), _table5(study, t)]
     protocols = [name for name in PROTOCOL_NOTES if any(key[1] == name for key in study.cells)]
-    return [*found, *(overview(study, name) for name in protocols)]
+    found += [overview(study, name) for name in protocols]
+    return [*found, *([_few_shot(study)] if study.few_shot else []), *([_windows(study)] if study.windows else [])]
 
 
 def overview(study: Study, protocol: str) -> Table:
@@ -96,6 +98,48 @@ def overview(study: Study, protocol: str) -> Table:
         ],
         rows,
         note=PROTOCOL_NOTES[protocol],
+    )
+
+
+def _few_shot(study: Study) -> Table:
+    rows = [
+        [
+            {"adult": "H2-H1-R1", "kid": "H1-H2-R1"}[newcomer],
+            str(row["count"]),
+            f"{row['chain']:.4f} ± {row['chain_spread']:.4f}",
+            f"{row['direct']:.4f} ± {row['direct_spread']:.4f}",
+        ]
+        for newcomer, found in sorted(study.few_shot.items())
+        for row in found
+    ]
+    return Table(
+        "Few recordings: k paired actions of a new body, E (m), LOAO",
+        [Column("chain"), Column("k"), Column("chain E"), Column("direct pair E")],
+        rows,
+        note="syda/general, mean ± s.d. over draws of the k actions. Chain: k actions of the new body with the known "
+        "one, whose link into the robot lacks the scored action. Direct pair: k other actions with the robot.",
+    )
+
+
+def _windows(study: Study) -> Table:
+    rows = [
+        [
+            human,
+            row["name"],
+            f"{row['error']:.4f}",
+            f"{row['inside']:.4f}",
+            f"{100 * row['gain']:.1f}",
+            f"{100 * row['gain_inside']:.1f}",
+        ]
+        for human, found in sorted(study.windows.items())
+        for row in found
+    ]
+    return Table(
+        "Causal windows with their controls, E (m), LOAO, ridge",
+        [Column(name) for name in ("human", "variant", "E", "E, frames >= 8", "gain %", "gain %, frames >= 8")],
+        rows,
+        note="Clips are short and start alike, so a window tells how far a clip has come. A gain is believable only "
+        "where it exceeds that of the bare frame index and holds on frames well inside a clip.",
     )
 
 
@@ -188,7 +232,7 @@ def _table5(study: Study, t: dict[str, dict[str, float]]) -> Table:
 
 
 def write_study(study: Study, out: str | os.PathLike[str], about: dict[str, str]) -> Path:
-    """Writes ``table2.csv`` to ``table5.csv``, one ``overview_*.csv`` a protocol, ``study.json`` and plots.
+    """Writes every table as CSV (``table2.csv``, ``overview_loao.csv``, ``few_shot.csv``, ...), ``study.json``, plots.
 
     Args:
         study: what to write.
@@ -200,18 +244,35 @@ def write_study(study: Study, out: str | os.PathLike[str], about: dict[str, str]
     """
     folder = Path(out)
     for table in tables(study):
-        title = table.title.lower()
-        name = title.split(":")[0].replace(" ", "") if title.startswith("table") else f"overview_{title.split(', ')[1]}"
-        write_text(folder / f"{name}.csv", _csv([c.title for c in table.columns], table.rows))
+        write_text(folder / f"{_stem(table.title)}.csv", _csv([c.title for c in table.columns], table.rows))
     cells = [asdict(cell) for cell in study.cells.values()]
     write_json(
         folder / "study.json",
-        {"data": study.data, "seeds": study.seeds, "skipped": study.skipped, "versions": about, "cells": cells},
+        {
+            "data": study.data,
+            "seeds": study.seeds,
+            "skipped": study.skipped,
+            "versions": about,
+            "cells": cells,
+            "few_shot": study.few_shot,
+            "windows": study.windows,
+        },
     )
     for protocol in PROTOCOL_NOTES:
         if any(key[1] == protocol for key in study.cells):
             _plot(study, protocol, folder / f"errors_{protocol}.png")
     return folder
+
+
+_FILES = {"errors": "overview_{}", "few": "few_shot", "causal": "windows"}
+
+
+def _stem(title: str) -> str:
+    """File name of a table."""
+    words = title.lower()
+    if words.startswith("table"):
+        return words.split(":")[0].replace(" ", "")
+    return _FILES[words.split(" ")[0]].format(words.split(", ")[1])
 
 
 def _plot(study: Study, protocol: str, path: Path) -> None:

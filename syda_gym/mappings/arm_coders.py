@@ -30,6 +30,9 @@ PLACED_WIDTH = 15
 
 _MIRROR = np.array([1.0, -1.0, 1.0])
 _SHORTEST = 1e-6  # m
+_DOWN = (0.0, 0.0, -1.0)
+_HANGING = (_DOWN, _DOWN)
+"""Upper arm and forearm of an arm that nothing tells about."""
 
 
 class HumanArmCoder(Coder):
@@ -64,6 +67,7 @@ class HumanArmCoder(Coder):
         self.rest = _shaped(arrays, "rest", (len(body.sides), 3, 3))
         self._lateral: list[float] = self._signs[:, 1].tolist()
         self._size, self._middle = float(self.lengths.sum()), self.shoulder.tolist()
+        self._turn = np.ascontiguousarray(body.axes.T)
 
     @classmethod
     def fit(cls, body: HumanSkeleton, frames: FloatArray, sides: Sequence[Side], placed: bool = False) -> HumanArmCoder:
@@ -91,7 +95,7 @@ class HumanArmCoder(Coder):
     def encode(self, frames: FloatArray) -> FloatArray:
         """Codes ``(N, arms, 12)``, or 15 numbers for a placed code."""
         if len(frames) == 1:
-            return self._encode_one(frames[0])
+            return self.encode_one(frames[0])[None]
         points = _facing_forward(self.human.arm_points(frames))[:, self._arms] * self._signs[:, None]
         elbow = points[:, :, 1] - points[:, :, 0]
         hand = points[:, :, 2] - points[:, :, 0]
@@ -114,29 +118,31 @@ class HumanArmCoder(Coder):
             axis=-1,
         )
 
-    def _encode_one(self, frame: FloatArray) -> FloatArray:
-        """The same for one frame ``(F,)`` in plain floats; live teleoperation encodes frame by frame."""
-        points = (frame.reshape(-1, 3) @ self.human.axes.T).tolist()
+    def encode_one(self, frame: FloatArray) -> FloatArray:
+        """The same for one frame ``(F,)`` in plain floats, ``(arms, 12)``; live use encodes frame by frame."""
+        points = (frame.reshape(-1, 3) @ self._turn).tolist()
         cos, sin = _heading(points) if len(points) == 6 else (1.0, 0.0)
-        rows, total = [], 0.0
+        limbs, total = [], 0.0
         for arm, sign in zip(self._arms, self._lateral, strict=True):
-            (sx, sy, sz), (ex, ey, ez), (hx, hy, hz) = (
-                (cos * x - sin * y, (sin * x + cos * y) * sign, z) for x, y, z in points[3 * arm : 3 * arm + 3]
-            )
-            upper, fore, hand = (ex - sx, ey - sy, ez - sz), (hx - ex, hy - ey, hz - ez), (hx - sx, hy - sy, hz - sz)
-            long_upper, long_fore = math.hypot(*upper), math.hypot(*fore)
-            total += long_upper + long_fore
-            rows.append(((sx, sy, sz), upper, hand, fore, max(long_upper, _SHORTEST), max(long_fore, _SHORTEST)))
-        size = self._size if self.placed else max(total / len(rows), _SHORTEST)
-        codes = []
-        for shoulder, upper, hand, fore, long_upper, long_fore in rows:
-            code = [v / size for v in (*upper, *hand)]
-            code += [v / long_upper for v in upper]
-            code += [v / long_fore for v in fore]
+            (sx, sy, sz), (ex, ey, ez), (hx, hy, hz) = points[3 * arm : 3 * arm + 3]
+            x, y, uz = ex - sx, ey - sy, ez - sz
+            ux, uy = cos * x - sin * y, (sin * x + cos * y) * sign
+            x, y, fz = hx - ex, hy - ey, hz - ez
+            fx, fy = cos * x - sin * y, (sin * x + cos * y) * sign
+            upper, fore = math.sqrt(ux * ux + uy * uy + uz * uz), math.sqrt(fx * fx + fy * fy + fz * fz)
+            total += upper + fore
+            limbs.append((ux, uy, uz, fx, fy, fz, max(upper, _SHORTEST), max(fore, _SHORTEST)))
+        size = self._size if self.placed else max(total / len(limbs), _SHORTEST)
+        codes: list[float] = []
+        for index, (ux, uy, uz, fx, fy, fz, upper, fore) in enumerate(limbs):
             if self.placed:
-                code = [(v - m) / size for v, m in zip(shoulder, self._middle, strict=True)] + code
-            codes.append(code)
-        return np.array([codes])
+                x, y, z = points[3 * self._arms[index]]
+                mx, my, mz = self._middle
+                lateral = (sin * x + cos * y) * self._lateral[index]
+                codes += ((cos * x - sin * y - mx) / size, (lateral - my) / size, (z - mz) / size)
+            codes += (ux / size, uy / size, uz / size, (ux + fx) / size, (uy + fy) / size, (uz + fz) / size)
+            codes += (ux / upper, uy / upper, uz / upper, fx / fore, fy / fore, fz / fore)
+        return np.array(codes).reshape(len(limbs), -1)
 
     def decode(self, codes: FloatArray) -> FloatArray:
         """Frames ``(N, F)``: the mean of scaled positions and of limbs of fixed length along the directions."""
@@ -191,6 +197,14 @@ class RobotArmCoder(Coder):
         self._lateral: list[float] = self._signs[:, 1].tolist()
         self._ik = LimbIK(body)
         self.extra_columns, self.extra_signs = self._extras()
+        idle = np.ones(body.n_features, dtype=bool)
+        for arm in self._arms:
+            idle[body.arm_slices[arm]] = False
+        self._resting = [(int(column), float(self.rest[column])) for column in np.flatnonzero(idle)]
+        self._extra_places = [
+            (arm, 6 + index, int(column), float(self.extra_signs[arm, index]))
+            for (arm, index), column in np.ndenumerate(self.extra_columns)
+        ]
 
     @classmethod
     def fit(cls, body: Robot, frames: FloatArray, sides: Sequence[Side]) -> RobotArmCoder:
@@ -216,7 +230,7 @@ class RobotArmCoder(Coder):
     def decode(self, codes: FloatArray) -> FloatArray:
         """Joint angles ``(N, n)`` within the limits."""
         if len(codes) == 1:
-            return self._decode_one(codes[0])
+            return self.decode_one(codes[0].tolist())[None]
         limbs = codes[..., :6].reshape(*codes.shape[:2], 2, 3)
         # A vanishing direction (a model that knows nothing) becomes a hanging arm rather than a division by zero.
         limbs = np.where(np.sum(limbs**2, axis=-1, keepdims=True) < 1e-12, [0.0, 0.0, -1.0], limbs)
@@ -231,20 +245,20 @@ class RobotArmCoder(Coder):
         frames[:, self.extra_columns] = codes[..., 6:] * self.extra_signs
         return self.robot.clamp(frames)
 
-    def _decode_one(self, codes: FloatArray) -> FloatArray:
-        """The same for one frame, codes ``(arms, 6 + extras)``; live teleoperation decodes frame by frame."""
-        wanted = [[[0.0, 0.0, -1.0], [0.0, 0.0, -1.0]] for _ in self.robot.sides]
-        for arm, sign, row in zip(self._arms, self._lateral, codes.tolist(), strict=True):
-            for limb in (0, 1):
-                x, y, z = row[3 * limb : 3 * limb + 3]
-                if x * x + y * y + z * z >= 1e-12:
-                    wanted[arm][limb] = [x, y * sign, z]
-        solved, frame = self._ik.solve_frame(wanted), self.rest.copy()
-        for arm in self._arms:
-            part = self.robot.arm_slices[arm]
-            frame[part] = solved[part]
-        frame[self.extra_columns] = codes[:, 6:] * self.extra_signs
-        return self.robot.clamp(frame)
+    def decode_one(self, codes: list[list[float]]) -> FloatArray:
+        """The same for one frame ``(n,)`` from finite codes ``(arms, 6 + extras)``; live use decodes frame by frame."""
+        wanted = [_HANGING] * len(self.robot.sides)
+        for arm, sign, (ux, uy, uz, fx, fy, fz, *_) in zip(self._arms, self._lateral, codes, strict=True):
+            n, m = math.sqrt(ux * ux + uy * uy + uz * uz), math.sqrt(fx * fx + fy * fy + fz * fz)
+            upper = (ux / n, uy * sign / n, uz / n) if n >= _SHORTEST else _DOWN
+            fore = (fx / m, fy * sign / m, fz / m) if m >= _SHORTEST else _DOWN
+            wanted[arm] = (upper, fore)
+        frame = self._ik.solve_frame(wanted)
+        for column, angle in self._resting:
+            frame[column] = angle
+        for arm, index, column, sign in self._extra_places:
+            frame[column] = codes[arm][index] * sign
+        return np.array(self.robot.clamp_one(frame))
 
     def arrays(self) -> Arrays:
         """The pose of arms that are not coded."""

@@ -17,17 +17,34 @@ from syda_gym.mappings.confidence import Confidence, action_maximum, fit_confide
 from syda_gym.mappings.heads import HeadedRegressor, fit_head
 from syda_gym.mappings.jobs import FitJob
 from syda_gym.mappings.lag import estimate_lags, shift_targets
+from syda_gym.mappings.mapping import map_clips
 from syda_gym.mappings.regressors import Regressor
+from syda_gym.mappings.window_coder import WindowCoder, encode_clips
 from syda_gym.motions.clip import PairedMotions
 
-__all__ = ["ArmProblem", "RowFitter", "fit_problems"]
+__all__ = ["ArmCoder", "ArmProblem", "Coding", "RowFitter", "action_groups", "fit_problems"]
 
-ArmCoder = HumanArmCoder | RobotArmCoder
+ArmCoder = HumanArmCoder | RobotArmCoder | WindowCoder
 RowFitter = Callable[[Sequence["ArmProblem"]], list[Regressor]]
 """Fits one regressor between the main codes of each problem, all together where that is faster."""
 
 _MAX_HELD_OUT = 10
 _MAX_ROWS = 8000
+
+
+@dataclass(frozen=True)
+class Coding:
+    """How frames become codes.
+
+    Attributes:
+        max_lag: largest lag searched for [frames].
+        placed: whether a human's code says where the shoulder is.
+        window: past frames beside each frame of a human source.
+    """
+
+    max_lag: int = 0
+    placed: bool = False
+    window: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,28 +70,43 @@ class ArmProblem:
     lags: dict[str, int]
 
     @classmethod
-    def build(cls, pair: PairedMotions, seed: int, max_lag: int, placed: bool = False) -> ArmProblem:
-        """Calibrates, encodes, and removes the lag of a human who mimicked a robot."""
-        sides = shared_arms(pair.source_body, pair.target_body)
-        source_coder = arm_coder(pair.source_body, pair.source, sides[0], placed)
-        target_coder = arm_coder(pair.target_body, pair.target, sides[1], placed)
-        source, target = source_coder.encode(pair.source), target_coder.encode(pair.target)
+    def build(cls, pair: PairedMotions, seed: int, coding: Coding) -> ArmProblem:
+        """Calibrates, encodes, and removes the lag of a human who mimicked a robot.
+
+        Raises:
+            MappingError: a window over something else than a human who leads a robot.
+        """
         mimicry = pair.source_body.kind == "human" and pair.target_body.kind == "robot"
-        lags = estimate_lags(pair, source, target[..., :6], max_lag if mimicry else 0)
+        if coding.window and not mimicry:
+            raise MappingError(
+                f"window={coding.window}: a window looks back over a human's frames on the way to a robot; {pair!r} "
+                "maps single frames, leave window out"
+            )
+        sides = shared_arms(pair.source_body, pair.target_body)
+        source_coder: ArmCoder = arm_coder(pair.source_body, pair.source, sides[0], coding.placed)
+        target_coder = arm_coder(pair.target_body, pair.target, sides[1], coding.placed)
+        if coding.window and isinstance(source_coder, HumanArmCoder):
+            source_coder = WindowCoder.around(source_coder, coding.window)
+        source, target = encode_clips(source_coder, pair), target_coder.encode(pair.target)
+        lags = estimate_lags(pair, source, target[..., :6], coding.max_lag if mimicry else 0)
         shifted = shift_targets(pair, target, lags)
         return cls(pair, seed, source_coder, target_coder, source, shifted, lags)
 
     @property
+    def main(self) -> tuple[FloatArray, FloatArray]:
+        """Codes without extra joints, ``(N, K, D)`` and ``(N, K, E)``."""
+        return self.source[..., : main_width(self.source_coder)], self.target[..., : main_width(self.target_coder)]
+
+    @property
     def rows(self) -> tuple[FloatArray, FloatArray]:
-        """Main codes arm by arm, ``(N * K, D)`` and ``(N * K, E)``, without extra joints; thinned if very many."""
-        x = self.source[..., : main_width(self.source_coder)]
-        y = self.target[..., : main_width(self.target_coder)]
+        """Main codes arm by arm, ``(N * K, D)`` and ``(N * K, E)``; thinned if very many."""
+        x, y = self.main
         step = -(-len(x) * x.shape[1] // _MAX_ROWS)
         return x[::step].reshape(-1, x.shape[-1]), y[::step].reshape(-1, y.shape[-1])
 
-    def without(self, actions: Sequence[str], max_lag: int, placed: bool = False) -> ArmProblem:
+    def without(self, actions: Sequence[str], coding: Coding) -> ArmProblem:
         """The same problem with some actions held out, calibrated anew."""
-        return ArmProblem.build(self.pair.without_actions(actions), self.seed, max_lag, placed)
+        return ArmProblem.build(self.pair.without_actions(actions), self.seed, coding)
 
 
 def main_width(coder: ArmCoder) -> int:
@@ -87,9 +119,8 @@ def fit_problems(
     method: str,
     fitter: RowFitter,
     *,
-    max_lag: int,
+    coding: Coding,
     confidence: bool,
-    placed: bool = False,
 ) -> list[CodedMapping]:
     """Fits mappings per arm, each with extra-joint heads and, if wanted, a confidence both ways.
 
@@ -97,9 +128,8 @@ def fit_problems(
         jobs: what to fit.
         method: name for the card.
         fitter: fits the regressors.
-        max_lag: largest lag searched for [frames].
+        coding: how frames become codes.
         confidence: also hold actions out, for the error bound.
-        placed: whether a human's code says where the shoulder is.
 
     Returns:
         One mapping per job.
@@ -107,10 +137,10 @@ def fit_problems(
     built: dict[int, ArmProblem] = {}
     for job in jobs:
         if id(job.pair) not in built:
-            built[id(job.pair)] = ArmProblem.build(job.pair, job.seed, max_lag, placed)
+            built[id(job.pair)] = ArmProblem.build(job.pair, job.seed, coding)
     problems = [replace(built[id(job.pair)], seed=job.seed) for job in jobs]
-    groups = [_groups(problem.pair) if confidence else [] for problem in problems]
-    held_out = [problem.without(g, max_lag, placed) for problem, gs in zip(problems, groups, strict=True) for g in gs]
+    groups = [action_groups(problem.pair) if confidence else [] for problem in problems]
+    held_out = [problem.without(g, coding) for problem, gs in zip(problems, groups, strict=True) for g in gs]
     fitted = iter(fitter([*problems, *held_out]))
     mains = [assemble(problem, next(fitted)) for problem in problems]
     trials = iter([assemble(problem, next(fitted)) for problem in held_out])
@@ -136,7 +166,7 @@ def assemble(problem: ArmProblem, regressor: Regressor) -> tuple[ArmCoder, ArmCo
     return a, b, HeadedRegressor(regressor, head, back, main_width(a), main_width(b))
 
 
-def _groups(pair: PairedMotions) -> list[list[str]]:
+def action_groups(pair: PairedMotions) -> list[list[str]]:
     """Actions to hold out together: one by one, or in at most ten groups."""
     names = list(pair.action_names)
     if len(names) < 2:
@@ -162,8 +192,11 @@ def _confidence(
 ) -> Confidence:
     bound = None
     if tests:
-        errors = [landmark_error(mapping.target, trial(test.source), test.target).mean(axis=1) for test, trial in tests]
+        errors = [
+            landmark_error(mapping.target, map_clips(trial, test), test.target).mean(axis=1) for test, trial in tests
+        ]
         bound = action_maximum(np.concatenate(errors), np.concatenate([test.actions for test, _ in tests]))
     rows = np.linspace(0, len(pair) - 1, min(len(pair), 400)).astype(int)
-    enlargement = gain(mapping.source, mapping.target, pair.source[rows], mapping(pair.source[rows]))
-    return fit_confidence(mapping.source_coder.encode(pair.source), pair.actions, bound, enlargement)
+    mapped = map_clips(mapping, pair)[rows] if mapping.window else mapping(pair.source[rows])
+    enlargement = gain(mapping.source, mapping.target, pair.source[rows], mapped)
+    return fit_confidence(encode_clips(mapping.source_coder, pair), pair.actions, bound, enlargement)

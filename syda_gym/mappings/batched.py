@@ -182,18 +182,26 @@ class BatchedNetwork:
                 self.flat.mul_(1.0 - rate * decay)
             self.flat.addcdiv_(self.mean, root, value=-rate / (1.0 - _BETA_MEAN**self.steps))
             return
-        if not self.uneven:  # from here on models have taken different numbers of steps
+        if not self.uneven:  # from here on models may have taken different numbers of steps
             self.uneven = True
             self.count += self.steps
-        taking = torch.ones_like(self.count, dtype=torch.bool) if active is None else active
-        self.mean = torch.where(taking, _BETA_MEAN * self.mean + (1.0 - _BETA_MEAN) * self.gradient, self.mean)
+        if active is None:
+            self.count += 1.0
+            self.mean.mul_(_BETA_MEAN).add_(self.gradient, alpha=1.0 - _BETA_MEAN)
+            self.square.mul_(_BETA_SQUARE).addcmul_(self.gradient, self.gradient, value=1.0 - _BETA_SQUARE)
+            root = (self.square / (1.0 - _BETA_SQUARE**self.count)).sqrt_().add_(_EPSILON)
+            if decay:
+                self.flat.mul_(1.0 - rate * decay)
+            self.flat.sub_(torch.div(self.mean, root, out=root).mul_(rate / (1.0 - _BETA_MEAN**self.count)))
+            return
+        self.mean = torch.where(active, _BETA_MEAN * self.mean + (1.0 - _BETA_MEAN) * self.gradient, self.mean)
         squared = _BETA_SQUARE * self.square + (1.0 - _BETA_SQUARE) * self.gradient**2
-        self.square = torch.where(taking, squared, self.square)
-        self.count = self.count + taking
+        self.square = torch.where(active, squared, self.square)
+        self.count = self.count + active
         count = self.count.clamp(min=1.0)
         root = (self.square / (1.0 - _BETA_SQUARE**count)).sqrt_().add_(_EPSILON)
         step = rate * (self.mean / (1.0 - _BETA_MEAN**count) / root + decay * self.flat)
-        self.flat -= torch.where(taking, step, torch.zeros_like(step))
+        self.flat -= torch.where(active, step, torch.zeros_like(step))
 
 
 def _sizes(layers: dict[str, tuple[int, ...]]) -> list[int]:

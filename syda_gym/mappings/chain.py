@@ -74,6 +74,11 @@ class ChainMapping(Mapping):
         """Names of the bodies that motion passes."""
         return (self.source.name, *(link.target.name for link in self.links))
 
+    @property
+    def window(self) -> int:
+        """How many past frames each output looks at: the links' windows add up."""
+        return sum(link.window for link in self.links)
+
     def raw(self, frames: FloatArray) -> FloatArray:
         """Applies the links in turn; only the last one is left without joint limits."""
         for link in self.links[:-1]:

@@ -10,37 +10,40 @@ from typing import Any
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import OptionError
-from syda_gym.mappings.arm_problem import ArmProblem, fit_problems
+from syda_gym.mappings.arm_problem import ArmProblem, Coding, fit_problems
 from syda_gym.mappings.coded import CodedMapping
-from syda_gym.mappings.general import GENERAL, fit_networks, take_options
+from syda_gym.mappings.general import GENERAL, fit_hops, fit_networks, take_options
 from syda_gym.mappings.jobs import FitJob
 from syda_gym.mappings.linear import KernelRidge, Nearest, Ridge
 from syda_gym.mappings.regressors import Regressor
-from syda_gym.mappings.residual import HopRegressor, MeanRegressor, TwoWay
+from syda_gym.mappings.residual import MeanRegressor, TwoWay
 from syda_gym.mappings.training import Progress
 
 __all__ = ["fit_accurate", "fit_kernel_ridge", "fit_nearest", "fit_ridge"]
 
-_COMMON = {"lag": 6, "confidence": True}
+_COMMON = {"lag": 0, "window": 0, "confidence": True}
 
 
 def fit_ridge(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
-    """Ridge regression. Options: ``lag`` (6), ``confidence`` (true), ``shrinkage`` (0.1)."""
-    own = _options(jobs, {**_COMMON, "shrinkage": 0.1})
+    """Ridge regression. Options: ``lag`` (6), ``window`` (0), ``confidence`` (true), ``shrinkage`` (0.1)."""
+    own = _options(jobs, {**_COMMON, "lag": 6, "shrinkage": 0.1})
     return _fit(jobs, "ridge", own, lambda x, y: Ridge.fit(x, y, float(own["shrinkage"])))
 
 
 def fit_kernel_ridge(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
-    """Kernel ridge regression. Options: ``lag`` (0), ``confidence`` (true), ``shrinkage`` (1e-3), ``gamma`` (1)."""
-    own = _options(jobs, {"lag": 0, "confidence": True, "shrinkage": 1e-3, "gamma": 1.0})
+    """Kernel ridge regression.
+
+    Options: ``lag`` (0), ``window`` (0), ``confidence`` (true), ``shrinkage`` (1e-3), ``gamma`` (1).
+    """
+    own = _options(jobs, {**_COMMON, "shrinkage": 1e-3, "gamma": 1.0})
     return _fit(
         jobs, "kernel_ridge", own, lambda x, y: KernelRidge.fit(x, y, float(own["shrinkage"]), float(own["gamma"]))
     )
 
 
 def fit_nearest(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
-    """Nearest neighbour. Options: ``confidence`` (true), ``neighbours`` (1), ``lag`` (0)."""
-    own = _options(jobs, {"lag": 0, "confidence": True, "neighbours": 1})
+    """Nearest neighbour. Options: ``lag`` (0), ``window`` (0), ``confidence`` (true), ``neighbours`` (1)."""
+    own = _options(jobs, {**_COMMON, "neighbours": 1})
     return _fit(jobs, "nearest", own, lambda x, y: Nearest.fit(x, y, int(own["neighbours"])))
 
 
@@ -49,23 +52,17 @@ def fit_accurate(jobs: Sequence[FitJob], progress: Progress | None = None) -> li
 
     Robust ridge, and kernel ridge of what the geometric image leaves over, each once on the whole code and once on limb
     directions alone; back to a human robust ridge, kernel ridge and the inverse of ``general``. Options: ``lag``
-    (8), ``confidence`` (true), ``shrinkage`` (0.1), ``gamma`` (0.3), ``kernel_shrinkage`` (3), ``hop_shrinkage`` (30).
+    (8), ``window`` (0), ``confidence`` (true), ``shrinkage`` (0.1), ``gamma`` (0.3), ``kernel_shrinkage`` (3),
+    ``hop_shrinkage`` (chosen among the training actions, see ``nested``).
     """
     own = _options(
         jobs,
-        {
-            "lag": 8,
-            "confidence": True,
-            "shrinkage": 0.1,
-            "gamma": 0.3,
-            "kernel_shrinkage": 3.0,
-            "hop_shrinkage": 30.0,
-        },
+        {**_COMMON, "lag": 8, "shrinkage": 0.1, "gamma": 0.3, "kernel_shrinkage": 3.0, "hop_shrinkage": None},
     )
 
     def fitter(problems: Sequence[ArmProblem]) -> list[Regressor]:
         if problems[0].pair.source_body.kind == problems[0].pair.target_body.kind:
-            return [HopRegressor.fit(*problem.rows, float(own["hop_shrinkage"])) for problem in problems]
+            return fit_hops(problems, own["hop_shrinkage"])
         networks = fit_networks(problems, GENERAL, progress)
         # Only the network depends on the seed; fits of the same frames share the other members.
         closed: dict[int, tuple[MeanRegressor, list[Regressor]]] = {}
@@ -77,14 +74,14 @@ def fit_accurate(jobs: Sequence[FitJob], progress: Progress | None = None) -> li
             for problem, network in zip(problems, networks, strict=True)
         ]
 
-    return fit_problems(jobs, "syda", fitter, max_lag=int(own["lag"]), confidence=bool(own["confidence"]))
+    return fit_problems(jobs, "syda", fitter, coding=_coding(own), confidence=bool(own["confidence"]))
 
 
 def _members(problem: ArmProblem, own: dict[str, Any]) -> tuple[MeanRegressor, list[Regressor]]:
     """Four members towards a robot, two towards a human."""
     human, robot = problem.rows if problem.pair.target_body.kind == "robot" else problem.rows[::-1]
     shrinkage, penalty, gamma = (float(own[name]) for name in ("shrinkage", "kernel_shrinkage", "gamma"))
-    width = human.shape[1]
+    width = human.shape[1]  # a window's current frame comes last
     members: list[Regressor] = []
     for start in (0, width - 6):
         members.append(Ridge.fit(human[:, start:], robot, shrinkage, robust=True))
@@ -115,7 +112,11 @@ def _fit(
     def fitter(problems: Sequence[ArmProblem]) -> list[Regressor]:
         return [fit_rows(*problem.rows) for problem in problems]
 
-    return fit_problems(jobs, method, fitter, max_lag=int(own["lag"]), confidence=bool(own["confidence"]))
+    return fit_problems(jobs, method, fitter, coding=_coding(own), confidence=bool(own["confidence"]))
+
+
+def _coding(own: dict[str, Any]) -> Coding:
+    return Coding(int(own["lag"]), window=int(own["window"]))
 
 
 def _options(jobs: Sequence[FitJob], defaults: dict[str, Any]) -> dict[str, Any]:

@@ -13,6 +13,8 @@ from syda_gym.mappings.card import MappingCard
 from syda_gym.mappings.coders import Coder
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.mappings.regressors import Regressor
+from syda_gym.mappings.single import SingleFrame
+from syda_gym.mappings.window_coder import WindowCoder
 
 if TYPE_CHECKING:
     from syda_gym.mappings.confidence import Confidence
@@ -49,11 +51,17 @@ class CodedMapping(Mapping):
         self.confidence = confidence
         self.confidence_back = confidence_back
         self._card = card
+        self._single = SingleFrame.of(source_coder, regressor, target_coder)
 
     @property
     def card(self) -> MappingCard:
         """Where the mapping comes from."""
         return self._card
+
+    @property
+    def window(self) -> int:
+        """How many past frames each output looks at."""
+        return self.source_coder.window if isinstance(self.source_coder, WindowCoder) else 0
 
     def raw(self, frames: FloatArray) -> FloatArray:
         """Encodes, regresses, decodes; joint limits are not enforced."""
@@ -95,6 +103,11 @@ class CodedMapping(Mapping):
     def unfamiliar(self, frames: ArrayLike) -> NDArray[np.bool_]:
         """Which frames are out of the distribution of the fit, ``(N,)``."""
         return self._confidence().unfamiliar(self.source_coder.encode(self.source.check(frames)))
+
+    def _one(self, frame: FloatArray) -> FloatArray:
+        mapped = self._single(frame) if self._single is not None else None
+        # Whatever is unusual takes the long way, which says what is wrong.
+        return super()._one(frame) if mapped is None else mapped
 
     def _confidence(self) -> Confidence:
         if self.confidence is None:

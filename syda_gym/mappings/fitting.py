@@ -10,7 +10,7 @@ from syda_gym.errors import MappingError, OptionError, nearest_name
 from syda_gym.mappings.classic import fit_accurate, fit_kernel_ridge, fit_nearest, fit_ridge
 from syda_gym.mappings.coded import CodedMapping
 from syda_gym.mappings.direct import fit_direct_paper
-from syda_gym.mappings.general import fit_direct_general, fit_general, fit_interpolation
+from syda_gym.mappings.general import fit_direct_general, fit_general, fit_interpolation, fit_nested
 from syda_gym.mappings.geometric import fit_fixed_axes, fit_mink, fit_procrustes
 from syda_gym.mappings.jobs import FitJob, Fitter, check_pair
 from syda_gym.mappings.syda import fit_paper
@@ -42,7 +42,13 @@ class Method:
 
 METHODS: dict[str, Method] = {
     "syda": Method(
-        {"general": fit_general, "accurate": fit_accurate, "interpolation": fit_interpolation, "paper": fit_paper},
+        {
+            "general": fit_general,
+            "nested": fit_nested,
+            "accurate": fit_accurate,
+            "interpolation": fit_interpolation,
+            "paper": fit_paper,
+        },
         True,
         "dual autoencoder with shared synergies; maps both ways",
     ),

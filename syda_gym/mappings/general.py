@@ -10,13 +10,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import OptionError
-from syda_gym.mappings.arm_problem import ArmProblem, fit_problems
+from syda_gym.mappings.arm_problem import ArmProblem, Coding, fit_problems
 from syda_gym.mappings.coded import CodedMapping
 from syda_gym.mappings.jobs import FitJob
+from syda_gym.mappings.nested import choose_hop_shrinkage, choose_noise
 from syda_gym.mappings.regressors import DirectRegressor, DualRegressor, Regressor
 from syda_gym.mappings.residual import HopRegressor
 from syda_gym.mappings.scaling import Scaler
@@ -29,7 +27,9 @@ __all__ = [
     "INTERPOLATION",
     "fit_direct_general",
     "fit_general",
+    "fit_hops",
     "fit_interpolation",
+    "fit_nested",
     "fit_networks",
     "take_options",
 ]
@@ -46,7 +46,7 @@ GENERAL = TrainingSettings(
     cosine=True,
     batch=64,
     epochs=80,
-    noise=0.25,
+    noise=0.3,
 )
 """Linear encoder and decoder with six synergies an arm: low capacity is what carries over to unseen actions."""
 
@@ -65,17 +65,22 @@ INTERPOLATION = TrainingSettings(
 """For test poses that come from trained actions: capacity pays there."""
 
 _LAG = 6
-_HOP_SHRINKAGE = 30.0
 _ROWS_PER_STEP = 32
 
 
 def fit_general(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
     """SyDa with shared arms, low capacity, cross losses and lag compensation; between humans a hop.
 
-    Options: ``lag`` (largest lag searched for, 6 frames), ``confidence`` (hold actions out for the error bound, true),
-    ``hop_shrinkage`` (30), and the fields of ``TrainingSettings``.
+    Options: ``lag`` (largest lag searched for, 6 frames), ``window`` (past frames that a human's code shows, 0),
+    ``confidence`` (hold actions out for the error bound, true), ``hop_shrinkage`` (chosen among the training actions,
+    see ``nested``), and the fields of ``TrainingSettings``.
     """
     return _fit(jobs, GENERAL, "syda", progress)
+
+
+def fit_nested(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
+    """``general`` with its input noise chosen among the training actions, see ``nested``; options alike."""
+    return _fit(jobs, GENERAL, "syda", progress, select=True)
 
 
 def fit_direct_general(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
@@ -95,12 +100,20 @@ def take_options(options: dict[str, Any], defaults: dict[str, Any]) -> tuple[dic
     """Splits options into those named in ``defaults`` (filled up) and the others.
 
     Raises:
-        OptionError: a value of another type than its default, or a negative number.
+        OptionError: a value of another type than its default (``None`` stands for an optional number), or a negative
+            number.
     """
     own = {name: options.get(name, default) for name, default in defaults.items()}
     for name, value in own.items():
-        expected = type(defaults[name])
-        fits = isinstance(value, bool) if expected is bool else isinstance(value, int | float) and value >= 0
+        default = defaults[name]
+        if default is None and value is None:
+            continue
+        expected = float if default is None else type(default)
+        if expected is bool:
+            fits = isinstance(value, bool)
+        else:
+            kinds = int if expected is int else int | float
+            fits = isinstance(value, kinds) and not isinstance(value, bool) and value >= 0
         if not fits:
             raise OptionError(f"option {name!r} must be a {expected.__name__} (not negative), got {value!r}")
     return own, {name: value for name, value in options.items() if name not in defaults}
@@ -113,18 +126,45 @@ def _fit(
     progress: Progress | None,
     lag: int = _LAG,
     placed: bool = False,
+    select: bool = False,
 ) -> list[CodedMapping]:
-    own, rest = take_options(jobs[0].options, {"lag": lag, "confidence": True, "hop_shrinkage": _HOP_SHRINKAGE})
+    defaults = {"lag": lag, "window": 0, "confidence": True, "hop_shrinkage": None}
+    own, rest = take_options(jobs[0].options, defaults)
     settings = with_options(preset, rest)
 
     def fitter(problems: Sequence[ArmProblem]) -> list[Regressor]:
         if method == "syda" and problems[0].pair.source_body.kind == problems[0].pair.target_body.kind:
-            return [HopRegressor.fit(*problem.rows, float(own["hop_shrinkage"])) for problem in problems]
+            return fit_hops(problems, own["hop_shrinkage"])
+        if select and "noise" not in rest:
+            return _fit_selected(problems, settings, progress)
         return fit_networks(problems, settings, progress)
 
-    return fit_problems(
-        jobs, method, fitter, max_lag=int(own["lag"]), confidence=bool(own["confidence"]), placed=placed
-    )
+    coding = Coding(int(own["lag"]), placed, int(own["window"]))
+    return fit_problems(jobs, method, fitter, coding=coding, confidence=bool(own["confidence"]))
+
+
+def fit_hops(problems: Sequence[ArmProblem], shrinkage: float | None) -> list[Regressor]:
+    """Hops between bodies of one kind; without a shrinkage each chooses its own among its training actions."""
+    by_pair = {
+        id(problem.pair): choose_hop_shrinkage(problem) if shrinkage is None else float(shrinkage)
+        for problem in {id(problem.pair): problem for problem in problems}.values()
+    }
+    return [HopRegressor.fit(*problem.rows, by_pair[id(problem.pair)]) for problem in problems]
+
+
+def _fit_selected(
+    problems: Sequence[ArmProblem], settings: TrainingSettings, progress: Progress | None
+) -> list[Regressor]:
+    """Networks whose input noise each training set chose for itself; equal choices train together."""
+    distinct = {id(problem.pair): problem for problem in problems}
+    chosen = {key: choose_noise(problem) for key, problem in distinct.items()}
+    noises = [chosen[id(problem.pair)] for problem in problems]
+    fitted: dict[int, Regressor] = {}
+    for noise in sorted(set(noises)):
+        places = [place for place, own in enumerate(noises) if own == noise]
+        models = fit_networks([problems[place] for place in places], replace(settings, noise=noise), progress)
+        fitted.update(zip(places, models, strict=True))
+    return [fitted[place] for place in range(len(problems))]
 
 
 def fit_networks(
@@ -134,7 +174,7 @@ def fit_networks(
     scales, data = [], []
     for problem in problems:
         x, y = problem.rows
-        scale_a, scale_b = _isotropic(x), _isotropic(y)
+        scale_a, scale_b = Scaler.fit(x), Scaler.fit(y)
         scales.append((scale_a, scale_b))
         data.append(Job(scale_a(x), scale_b(y), problem.seed))
     # Larger recordings take larger batches, not more steps: the time of a fit stays the same.
@@ -143,14 +183,3 @@ def fit_networks(
     kind = DualRegressor if settings.dual else DirectRegressor
     trained = train(data, settings, progress)
     return [kind(stacks, *scale) for stacks, scale in zip(trained, scales, strict=True)]
-
-
-def _isotropic(rows: FloatArray) -> Scaler:
-    """Standardises every 3-vector of a human's code, or all of a robot's, by one number.
-
-    So all directions in space count alike.
-    """
-    mean, spread = rows.mean(axis=0), rows.std(axis=0)
-    size = rows.shape[1] if rows.shape[1] == 6 else 3
-    blocks = np.sqrt(np.mean(spread.reshape(-1, size) ** 2, axis=1))
-    return Scaler(mean, np.maximum(np.repeat(blocks, size), 1e-3))

@@ -14,7 +14,7 @@ import numpy as np
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import MappingError, OptionError
 from syda_gym.mappings.arm_coders import HumanArmCoder, RobotArmCoder
-from syda_gym.mappings.arm_problem import ArmProblem, fit_problems
+from syda_gym.mappings.arm_problem import ArmProblem, Coding, fit_problems
 from syda_gym.mappings.coded import CodedMapping
 from syda_gym.mappings.general import take_options
 from syda_gym.mappings.jobs import FitJob
@@ -107,7 +107,7 @@ def _fit(jobs: Sequence[FitJob], method: str, calibrated: bool, confidence: bool
     def fitter(problems: Sequence[ArmProblem]) -> list[Regressor]:
         return [_regressor(problem, calibrated) for problem in problems]
 
-    return fit_problems(jobs, method, fitter, max_lag=0, confidence=bool(own["confidence"]))
+    return fit_problems(jobs, method, fitter, coding=Coding(), confidence=bool(own["confidence"]))
 
 
 def _regressor(problem: ArmProblem, calibrated: bool) -> GeometricRegressor:

@@ -8,7 +8,7 @@ import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.mappings.linear import Ridge
-from syda_gym.mappings.regressors import Arrays, Regressor
+from syda_gym.mappings.regressors import Affine, Arrays, Regressor
 
 __all__ = ["HeadedRegressor", "fit_head"]
 
@@ -39,6 +39,17 @@ class HeadedRegressor(Regressor):
         """Main and extra codes, side by side."""
         main = self.main(codes if codes.shape[-1] == self.width else codes[..., : self.width])
         return main if self.head is None else np.concatenate([main, self.head(codes)], axis=-1)
+
+    def affine(self) -> Affine | None:
+        """Main part and head side by side, where the main part is affine."""
+        main = self.main.affine()
+        if main is None or self.head is None:
+            return main
+        slope, offset = self.head.affine()
+        # The head may see more of the code than the main part does.
+        padded = np.zeros((len(slope), main[0].shape[1]))
+        padded[: self.width] = main[0]
+        return np.concatenate([padded, slope], axis=1), np.concatenate([main[1], offset])
 
     def inverse(self) -> HeadedRegressor:
         """The main model's inverse with the heads exchanged."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.mappings.regressors import Arrays, Regressor
+from syda_gym.mappings.regressors import Affine, Arrays, Regressor
 from syda_gym.mappings.scaling import Scaler
 
 __all__ = ["KernelRidge", "Nearest", "Ridge"]
@@ -70,6 +70,10 @@ class Ridge(Regressor):
     def __call__(self, codes: FloatArray) -> FloatArray:
         """Affine map of codes ``(..., D)``."""
         return codes @ self._slope + self._offset
+
+    def affine(self) -> Affine:
+        """Slope and offset in raw codes."""
+        return self._slope, self._offset
 
     def arrays(self) -> Arrays:
         """Weights."""

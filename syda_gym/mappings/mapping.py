@@ -13,11 +13,12 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MappingError
 from syda_gym.mappings.card import MappingCard
 from syda_gym.mappings.limits import limit_speed
+from syda_gym.motions.clip import PairedMotions
 
 if TYPE_CHECKING:
     from syda_gym.mappings.chain import ChainMapping
 
-__all__ = ["Mapping"]
+__all__ = ["Mapping", "map_clips"]
 
 
 class Mapping(ABC):
@@ -53,6 +54,11 @@ class Mapping(ABC):
     def route(self) -> tuple[str, ...]:
         """Names of the bodies that motion passes, source and target included."""
         return (self.source.name, self.target.name)
+
+    @property
+    def window(self) -> int:
+        """How many past frames each output looks at; 0 for a mapping of single frames."""
+        return 0
 
     @abstractmethod
     def raw(self, frames: FloatArray) -> FloatArray:
@@ -102,16 +108,18 @@ class Mapping(ABC):
         """Maps frames.
 
         Args:
-            frames: ``(N, F_source)`` or one frame ``(F_source,)``.
+            frames: ``(N, F_source)`` or one frame ``(F_source,)``. A mapping with a ``window`` takes one clip in time
+                order; frame by frame it is used through ``stream.FrameStream``.
 
         Returns:
             ``(N, F_target)`` or ``(F_target,)``, within the target's joint limits.
 
         Raises:
             EmbodimentError: the frames are not frames of ``source``, or hold values that are not finite.
+            MappingError: a single frame for a mapping with a window.
         """
-        result = self._within_limits(self.raw(self.source.check(frames)))
-        return result[0] if np.ndim(frames) == 1 else result
+        array = np.asarray(frames, dtype=np.float64)
+        return self._one(array) if array.ndim == 1 else self._within_limits(self.raw(self.source.check(array)))
 
     def sequence(self, frames: ArrayLike, fps: float) -> FloatArray:
         """Maps a motion and limits the joint speeds causally.
@@ -139,7 +147,40 @@ class Mapping(ABC):
     def __repr__(self) -> str:
         return f"{type(self).__name__}({' > '.join(self.route)}, method={self.method!r}, preset={self.preset!r})"
 
+    def _one(self, frame: FloatArray) -> FloatArray:
+        """One frame ``(F,)``, not yet checked."""
+        if self.window:
+            raise MappingError(
+                f"{self!r} looks at the {self.window} frames before: give a clip (N, {self.source.n_features}) in time "
+                "order, or map frame by frame with syda_gym.mappings.stream.FrameStream"
+            )
+        result: FloatArray = self._within_limits(self.raw(self.source.check(frame)))[0]
+        return result
+
     def _within_limits(self, frames: FloatArray) -> FloatArray:
         if not np.isfinite(frames).all():
             raise MappingError(f"{self!r} gave values that are not finite; fit it again on more varied frames")
         return self.target.clamp(frames) if isinstance(self.target, Robot) else frames
+
+
+def map_clips(mapping: Mapping, pair: PairedMotions, *, raw: bool = False) -> FloatArray:
+    """Maps a pair's source frames, clip by clip where the mapping has a window.
+
+    Args:
+        mapping: from the pair's source body.
+        pair: the frames.
+        raw: leave joint limits unenforced.
+
+    Returns:
+        ``(N, F_target)`` in the pair's row order.
+    """
+
+    def mapped(frames: FloatArray) -> FloatArray:
+        return mapping.raw(mapping.source.check(frames)) if raw else mapping(frames)
+
+    if not mapping.window:
+        return mapped(pair.source)
+    result = np.empty((len(pair), mapping.target.n_features))
+    for rows in pair.clip_rows():
+        result[rows] = mapped(pair.source[rows])
+    return result

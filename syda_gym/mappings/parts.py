@@ -14,10 +14,14 @@ from syda_gym.mappings.linear import KernelRidge, Nearest, Ridge
 from syda_gym.mappings.mink_ik import MinkArmCoder
 from syda_gym.mappings.regressors import DirectRegressor, DualRegressor, Regressor
 from syda_gym.mappings.residual import HopRegressor, MeanRegressor, TwoWay
+from syda_gym.mappings.window_coder import WindowCoder
 
 __all__ = ["CODERS", "REGRESSORS", "restore_coder", "restore_regressor"]
 
-CODERS = {coder.kind: coder for coder in (PositionCoder, QuaternionCoder, HumanArmCoder, RobotArmCoder, MinkArmCoder)}
+CODERS = {
+    coder.kind: coder
+    for coder in (PositionCoder, QuaternionCoder, HumanArmCoder, RobotArmCoder, MinkArmCoder, WindowCoder)
+}
 """Kind to class."""
 
 REGRESSORS: dict[str, type[Regressor]] = {

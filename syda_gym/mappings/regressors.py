@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -12,9 +12,11 @@ from syda_gym.errors import MappingError
 from syda_gym.mappings.networks import Stack, stacks_from_arrays
 from syda_gym.mappings.scaling import Scaler
 
-__all__ = ["DirectRegressor", "DualRegressor", "Regressor"]
+__all__ = ["Affine", "DirectRegressor", "DualRegressor", "Regressor"]
 
 Arrays = dict[str, FloatArray]
+Affine = tuple[FloatArray, FloatArray]
+"""Weight ``(D, E)`` and bias ``(E,)``."""
 
 
 class Regressor(ABC):
@@ -37,6 +39,10 @@ class Regressor(ABC):
             "whose models map both ways"
         )
 
+    def affine(self) -> Affine | None:
+        """The whole model as one affine map, where it is one: then a single frame costs one small product."""
+        return None
+
     @abstractmethod
     def arrays(self) -> Arrays:
         """Fitted numbers, for storage."""
@@ -51,17 +57,17 @@ class Regressor(ABC):
         """Rebuilds what ``settings`` and ``arrays`` describe."""
 
 
-class DualRegressor(Regressor):
-    """SyDa: two autoencoders with shared latent features; A's encoder followed by B's decoder, or the other way.
+class DirectRegressor(Regressor):
+    """The direct autoencoder of the paper's comparison: A's encoder and B's decoder, trained on A-to-B alone.
 
     Args:
-        stacks: ``encode_a``, ``decode_a``, ``encode_b``, ``decode_b``.
+        stacks: one per entry of ``names``.
         scale_a: standardisation of A's codes.
         scale_b: standardisation of B's codes.
     """
 
-    kind = "syda"
-    names: ClassVar[tuple[str, ...]] = ("encode_a", "decode_a", "encode_b", "decode_b")
+    kind = "direct"
+    names: ClassVar[tuple[str, ...]] = ("encode_a", "decode_b")
 
     def __init__(self, stacks: dict[str, Stack], scale_a: Scaler, scale_b: Scaler) -> None:
         self.stacks = stacks
@@ -75,9 +81,44 @@ class DualRegressor(Regressor):
             return codes @ self._affine[0] + self._affine[1]
         return self.scale_b.undo(self.stacks["decode_b"](self.synergies(codes)))
 
+    def affine(self) -> Affine | None:
+        """The collapsed layers if all of them are linear."""
+        return self._affine
+
     def synergies(self, codes: FloatArray) -> FloatArray:
         """The latent features (synergies) of A's codes."""
         return self.stacks["encode_a"](self.scale_a(codes))
+
+    def arrays(self) -> Arrays:
+        """Weights, biases and scales."""
+        result = {key: value for name, stack in self.stacks.items() for key, value in stack.arrays(name).items()}
+        return {**result, **self.scale_a.arrays("scale_a"), **self.scale_b.arrays("scale_b")}
+
+    def settings(self) -> dict[str, Any]:
+        """The activation."""
+        encoder = self.stacks["encode_a"]
+        return {"slope": encoder.slope, "activated": encoder.activated}
+
+    @classmethod
+    def restore(cls, settings: dict[str, Any], arrays: Arrays) -> Self:
+        """Rebuilds the model."""
+        stacks = stacks_from_arrays(arrays, cls.names, float(settings["slope"]), bool(settings["activated"]))
+        if set(stacks) != set(cls.names):
+            raise MappingError(f"expected the networks {', '.join(cls.names)}, got {', '.join(stacks) or 'none'}")
+        return cls(stacks, Scaler.restore(arrays, "scale_a"), Scaler.restore(arrays, "scale_b"))
+
+
+class DualRegressor(DirectRegressor):
+    """SyDa: two autoencoders with shared latent features; A's encoder followed by B's decoder, or the other way.
+
+    Args:
+        stacks: ``encode_a``, ``decode_a``, ``encode_b``, ``decode_b``.
+        scale_a: standardisation of A's codes.
+        scale_b: standardisation of B's codes.
+    """
+
+    kind = "syda"
+    names: ClassVar[tuple[str, ...]] = ("encode_a", "decode_a", "encode_b", "decode_b")
 
     def reconstruct(self, codes: FloatArray) -> FloatArray:
         """A's codes through A's own autoencoder."""
@@ -88,61 +129,8 @@ class DualRegressor(Regressor):
         swapped = {"encode_a": "encode_b", "decode_a": "decode_b", "encode_b": "encode_a", "decode_b": "decode_a"}
         return type(self)({name: self.stacks[swapped[name]] for name in self.names}, self.scale_b, self.scale_a)
 
-    def arrays(self) -> Arrays:
-        """Weights, biases and scales."""
-        return _network_arrays(self.stacks, self.scale_a, self.scale_b)
 
-    def settings(self) -> dict[str, Any]:
-        """The activation."""
-        encoder = self.stacks["encode_a"]
-        return {"slope": encoder.slope, "activated": encoder.activated}
-
-    @classmethod
-    def restore(cls, settings: dict[str, Any], arrays: Arrays) -> DualRegressor:
-        """Rebuilds the model."""
-        stacks = stacks_from_arrays(arrays, cls.names, float(settings["slope"]), bool(settings["activated"]))
-        if set(stacks) != set(cls.names):
-            raise MappingError(f"expected the networks {', '.join(cls.names)}, got {', '.join(stacks) or 'none'}")
-        return cls(stacks, Scaler.restore(arrays, "scale_a"), Scaler.restore(arrays, "scale_b"))
-
-
-class DirectRegressor(Regressor):
-    """The direct autoencoder of the paper's comparison: A's encoder and B's decoder, trained on A-to-B alone."""
-
-    kind = "direct"
-    names: ClassVar[tuple[str, ...]] = ("encode_a", "decode_b")
-
-    def __init__(self, stacks: dict[str, Stack], scale_a: Scaler, scale_b: Scaler) -> None:
-        self.stacks = stacks
-        self.scale_a = scale_a
-        self.scale_b = scale_b
-        self._affine = _collapsed(stacks, scale_a, scale_b)
-
-    def __call__(self, codes: FloatArray) -> FloatArray:
-        """Encodes and decodes."""
-        if self._affine is not None:
-            return codes @ self._affine[0] + self._affine[1]
-        return self.scale_b.undo(self.stacks["decode_b"](self.stacks["encode_a"](self.scale_a(codes))))
-
-    def arrays(self) -> Arrays:
-        """Weights, biases and scales."""
-        return _network_arrays(self.stacks, self.scale_a, self.scale_b)
-
-    def settings(self) -> dict[str, Any]:
-        """The activation."""
-        encoder = self.stacks["encode_a"]
-        return {"slope": encoder.slope, "activated": encoder.activated}
-
-    @classmethod
-    def restore(cls, settings: dict[str, Any], arrays: Arrays) -> DirectRegressor:
-        """Rebuilds the model."""
-        stacks = stacks_from_arrays(arrays, cls.names, float(settings["slope"]), bool(settings["activated"]))
-        if set(stacks) != set(cls.names):
-            raise MappingError(f"expected the networks {', '.join(cls.names)}, got {', '.join(stacks) or 'none'}")
-        return cls(stacks, Scaler.restore(arrays, "scale_a"), Scaler.restore(arrays, "scale_b"))
-
-
-def _collapsed(stacks: dict[str, Stack], scale_a: Scaler, scale_b: Scaler) -> tuple[FloatArray, FloatArray] | None:
+def _collapsed(stacks: dict[str, Stack], scale_a: Scaler, scale_b: Scaler) -> Affine | None:
     """Weight and bias of A-to-B as one affine map if all layers are linear, for speed; otherwise ``None``."""
     path = (stacks["encode_a"], stacks["decode_b"])
     if any(stack.slope != 1.0 for stack in path):
@@ -151,8 +139,3 @@ def _collapsed(stacks: dict[str, Stack], scale_a: Scaler, scale_b: Scaler) -> tu
     through = np.concatenate([zero, np.eye(len(scale_a.mean))])
     images = scale_b.undo(path[1](path[0](scale_a(through))))
     return images[1:] - images[:1], images[0]
-
-
-def _network_arrays(stacks: dict[str, Stack], scale_a: Scaler, scale_b: Scaler) -> Arrays:
-    result = {key: value for name, stack in stacks.items() for key, value in stack.arrays(name).items()}
-    return {**result, **scale_a.arrays("scale_a"), **scale_b.arrays("scale_b")}

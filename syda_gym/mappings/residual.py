@@ -10,7 +10,7 @@ import numpy as np
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import MappingError
 from syda_gym.mappings.linear import Ridge
-from syda_gym.mappings.regressors import Arrays, Regressor
+from syda_gym.mappings.regressors import Affine, Arrays, Regressor
 
 __all__ = ["HopRegressor", "MeanRegressor", "TwoWay"]
 
@@ -35,6 +35,11 @@ class HopRegressor(Regressor):
     def __call__(self, codes: FloatArray) -> FloatArray:
         """Codes plus correction."""
         return codes + self.correction(codes)
+
+    def affine(self) -> Affine:
+        """Identity plus correction."""
+        slope, offset = self.correction.affine()
+        return np.eye(len(slope)) + slope, offset
 
     def inverse(self) -> HopRegressor:
         """The correction of the way back."""
@@ -122,6 +127,10 @@ class TwoWay(Regressor):
     def __call__(self, codes: FloatArray) -> FloatArray:
         """The forward regressor."""
         return self.there(codes)
+
+    def affine(self) -> Affine | None:
+        """That of the forward regressor."""
+        return self.there.affine()
 
     def inverse(self) -> TwoWay:
         """The two exchanged."""

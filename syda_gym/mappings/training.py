@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -18,6 +19,12 @@ if TYPE_CHECKING:
     import torch
 
 __all__ = ["Job", "Progress", "TrainingSettings", "train"]
+
+_CACHE = 1_600_000
+"""Floats that a group of models may keep busy, about 6 MB."""
+
+_COPIES = 4
+"""Weights, gradient and the two moments of Adam."""
 
 Progress = Callable[[float], None]
 """Called with the finished fraction, 0 to 1."""
@@ -60,15 +67,43 @@ def train(jobs: Sequence[Job], settings: TrainingSettings, progress: Progress | 
     widths = {(job.a.shape[1], job.b.shape[1]) for job in jobs}
     if len(widths) != 1:
         raise OptionError(f"jobs trained together need equal widths, got {sorted(widths)}")
-    network = BatchedNetwork(settings, *widths.pop(), [job.seed for job in jobs])
-    feed = _Feed(jobs, settings)
+    groups = _groups(jobs, settings, widths.pop())
+    result: dict[int, dict[str, Stack]] = {}
     with torch.no_grad():
-        for epoch in range(feed.epochs):
-            for batch in feed.epoch():
-                network.step(batch)
-            if progress is not None:
-                progress((epoch + 1) / feed.epochs)
-    return network.stacks()
+        for group in groups:
+            part = [jobs[index] for index in group]
+            network = BatchedNetwork(settings, part[0].a.shape[1], part[0].b.shape[1], [job.seed for job in part])
+            feed = _Feed(part, settings)
+            for epoch in range(feed.epochs):
+                for batch in feed.epoch():
+                    network.step(batch)
+                if progress is not None:
+                    progress((len(result) + len(group) * (epoch + 1) / feed.epochs) / len(jobs))
+            result.update(zip(group, network.stacks(), strict=True))
+    return [result[index] for index in range(len(jobs))]
+
+
+def _groups(jobs: Sequence[Job], settings: TrainingSettings, widths: tuple[int, int]) -> list[list[int]]:
+    """Jobs that train together: as many as fit the processor's cache, those with equally many rows side by side.
+
+    Models with equally many rows need no masks; a group that outgrows the cache waits for memory.
+    """
+    layers = [width for stack in settings.stacks(*widths).values() for width in stack]
+    weights = sum(
+        a * b + b for stack in settings.stacks(*widths).values() for a, b in zip(stack[:-1], stack[1:], strict=True)
+    )
+    floats = _COPIES * weights + settings.batch * sum(layers)
+    most = max(1, _CACHE // floats)
+    counts = Counter(len(job.a) for job in jobs)
+    order = sorted(range(len(jobs)), key=lambda index: len(jobs[index].a))
+    groups: list[list[int]] = [[]]
+    for place, index in enumerate(order):
+        count = len(jobs[index].a)
+        first_of_its_kind = place == 0 or len(jobs[order[place - 1]].a) != count
+        if len(groups[-1]) >= most or (first_of_its_kind and len(groups[-1]) + counts[count] > most):
+            groups.append([])
+        groups[-1].append(index)
+    return [group for group in groups if group]
 
 
 class _Feed:
@@ -99,9 +134,10 @@ class _Feed:
         b = torch.gather(self.b, 1, index.expand(-1, -1, self.b.shape[2]))
         seen_a, seen_b = self._noisy(a, b)
         even = bool((self.counts == longest).all())
+        shortest = int(self.counts.min())
         for step, start in enumerate(range(0, longest, self.settings.batch)):
             part = slice(start, min(start + self.settings.batch, longest))
-            weight, active = (None, None) if even else self._weights(part)
+            weight, active = (None, None) if part.stop <= shortest else self._weights(part)
             rate = self._rate(step, even)
             yield Batch(a[:, part], b[:, part], seen_a[:, part], seen_b[:, part], weight, active, rate)
         self.done += 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,9 @@ from syda_gym.errors import MappingError, OptionError
 from syda_gym.mappings.coded import CodedMapping
 from syda_gym.mappings.fitting import METHODS, fit_many
 from syda_gym.mappings.limits import speed_violations
-from syda_gym.mappings.mapping import Mapping
+from syda_gym.mappings.mapping import Mapping, map_clips
 from syda_gym.mappings.training import Progress
+from syda_gym.mappings.windows import WindowRow, window_study
 from syda_gym.motions.clip import PairedMotions
 
 __all__ = ["Fold", "Validation", "aligned_error", "cross_validate", "fit_folds", "held_out_errors"]
@@ -54,6 +55,8 @@ class Validation:
         aligned: mean error per seed after the best shift of each test recording: an oracle, it knows the answer.
         covered: ``(seeds, N)`` whether the error bound holds, or ``None`` without bounds.
         bounds: ``(seeds, N)`` error bounds [m], or ``None``.
+        controls: for a mapping with a window, what a window gains and how much of that the bare frame index gives; see
+            ``windows.window_study``. No result of a window means anything without them.
     """
 
     protocol: str
@@ -65,6 +68,7 @@ class Validation:
     aligned: FloatArray | None
     covered: np.ndarray[Any, np.dtype[np.bool_]] | None
     bounds: FloatArray | None
+    controls: tuple[WindowRow, ...] = ()
 
     @property
     def means(self) -> FloatArray:
@@ -140,8 +144,8 @@ def held_out_errors(pair: PairedMotions, folds: Sequence[Fold], protocol: str) -
         forward, backward, names, limits, shifted = [], [], [], [], []
         for fold in group:
             test, mapping = fold.test, fold.mapping
-            raw = mapping.raw(test.source)
-            mapped = mapping(test.source)
+            raw = map_clips(mapping, test, raw=True)
+            mapped = map_clips(mapping, test)
             forward.append(landmark_error(test.target_body, mapped, test.target))
             names.append(test.actions)
             if isinstance(mapping.target, Robot):
@@ -197,7 +201,9 @@ def cross_validate(
         >>> result.means, result.per_action()  # doctest: +SKIP
     """
     folds = fit_folds(pair, method, preset, protocol=protocol, seeds=seeds, back=back, progress=progress, **options)
-    return held_out_errors(pair, folds, protocol)
+    result = held_out_errors(pair, folds, protocol)
+    window = folds[0].mapping.window
+    return replace(result, controls=tuple(window_study(pair, window))) if window else result
 
 
 def aligned_error(test: PairedMotions, mapped: FloatArray, limit: int = 6) -> FloatArray:

@@ -7,19 +7,21 @@ window, and the error on frames that lie well inside the clip. ``window_study`` 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from syda_gym.embodiments import landmark_error
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import OptionError
-from syda_gym.mappings.arm_problem import ArmProblem, assemble
+from syda_gym.mappings.arm_problem import ArmProblem, Coding
 from syda_gym.mappings.linear import Ridge
+from syda_gym.mappings.window_coder import past_frames
 from syda_gym.motions.clip import PairedMotions
 
-__all__ = ["WindowRow", "past_frames", "window_study"]
+__all__ = ["WindowRow", "window_study"]
 
 _SHRINKAGE = 0.1
 _LAG = 6
@@ -27,6 +29,7 @@ INSIDE = 8
 """First frame of a clip that counts as well inside it."""
 
 Features = Callable[[PairedMotions, FloatArray], FloatArray]
+"""What a variant sees: a part of the pair and its codes ``(N, K, D)`` to inputs ``(N, K, E)``."""
 
 
 @dataclass(frozen=True)
@@ -48,26 +51,6 @@ class WindowRow:
     gain_inside: float
 
 
-def past_frames(pair: PairedMotions, codes: FloatArray, window: int) -> FloatArray:
-    """Codes beside those of the ``window`` frames before, within each clip; the first frame is held.
-
-    Args:
-        pair: tells clips apart.
-        codes: ``(N, K, D)``.
-        window: frames to look back.
-
-    Returns:
-        ``(N, K, D (1 + window))``.
-    """
-    parts = [codes]
-    for back in range(1, window + 1):
-        shifted = np.empty_like(codes)
-        for rows in pair.clip_rows():
-            shifted[rows] = codes[rows[np.maximum(np.arange(len(rows)) - back, 0)]]
-        parts.append(shifted)
-    return np.concatenate(parts, axis=-1)
-
-
 def window_study(pair: PairedMotions, window: int = 4) -> list[WindowRow]:
     """Leave-one-action-out errors of a ridge with and without a causal window, and the phase controls.
 
@@ -85,36 +68,44 @@ def window_study(pair: PairedMotions, window: int = 4) -> list[WindowRow]:
     if window < 1:
         raise OptionError(f"window must be at least 1 frame, got {window}")
 
-    def indexed(part: PairedMotions, codes: FloatArray) -> FloatArray:
-        phase = part.times[:, None, None] / 30.0
-        powers = np.concatenate([phase, phase**2, phase**3], axis=-1)
-        return np.concatenate([codes, np.repeat(powers, codes.shape[1], axis=1)], axis=-1)
+    def looking_back(part: PairedMotions, codes: FloatArray) -> FloatArray:
+        return past_frames(codes, window, part.clip_rows())
 
     variants: dict[str, Features] = {
         "one frame": lambda part, codes: codes,
-        f"window of {window}": lambda part, codes: past_frames(part, codes, window),
-        "control: one frame and its index": indexed,
-        f"control: window of {window} and index": lambda part, codes: indexed(part, past_frames(part, codes, window)),
+        f"window of {window}": looking_back,
+        "control: one frame and its index": _with_index,
+        f"control: window of {window} and index": lambda part, codes: _with_index(part, looking_back(part, codes)),
     }
-    scores = {name: _score(pair, features) for name, features in variants.items()}
-    base = scores["one frame"]
+    errors, times = _held_out(pair, list(variants.values()))
+    scores = [(float(values.mean()), float(values[times >= INSIDE].mean())) for values in errors]
+    base = scores[0]
     return [
         WindowRow(name, error, inside, 1.0 - error / base[0], 1.0 - inside / base[1])
-        for name, (error, inside) in scores.items()
+        for name, (error, inside) in zip(variants, scores, strict=True)
     ]
 
 
-def _score(pair: PairedMotions, features: Features) -> tuple[float, float]:
-    errors, times = [], []
+def _with_index(part: PairedMotions, codes: FloatArray) -> FloatArray:
+    """Codes beside powers of the frame index: all that a model could know of the clip's phase."""
+    phase = part.times[:, None, None] / 30.0
+    powers = np.concatenate([phase, phase**2, phase**3], axis=-1)
+    return np.concatenate([codes, np.repeat(powers, codes.shape[1], axis=1)], axis=-1)
+
+
+def _held_out(pair: PairedMotions, variants: Sequence[Features]) -> tuple[list[FloatArray], NDArray[np.int64]]:
+    """Mean landmark errors of every variant ``(N,)`` [m] and the frame indices ``(N,)``, action by action."""
+    errors: list[list[FloatArray]] = [[] for _ in variants]
+    times = []
     for train, test in pair.folds("loao"):
-        problem = ArmProblem.build(train, 0, _LAG)
-        source, target, _ = assemble(problem, Ridge.fit(*problem.rows, _SHRINKAGE))
-        inputs = features(train, problem.source)
-        model = Ridge.fit(
-            inputs.reshape(-1, inputs.shape[-1]), problem.target.reshape(-1, problem.target.shape[-1]), _SHRINKAGE
-        )
-        mapped = target.decode(model(features(test, source.encode(test.source))))
-        errors.append(landmark_error(test.target_body, mapped, test.target).mean(axis=1))
+        problem = ArmProblem.build(train, 0, Coding(_LAG))
+        source, target = problem.source_coder, problem.target_coder
+        outputs = problem.target.reshape(-1, problem.target.shape[-1])
+        codes = source.encode(test.source)
+        for found, features in zip(errors, variants, strict=True):
+            inputs = features(train, problem.source)
+            model = Ridge.fit(inputs.reshape(-1, inputs.shape[-1]), outputs, _SHRINKAGE)
+            mapped = target.decode(model(features(test, codes)))
+            found.append(landmark_error(test.target_body, mapped, test.target).mean(axis=1))
         times.append(test.times)
-    error, time = np.concatenate(errors), np.concatenate(times)
-    return float(error.mean()), float(error[time >= INSIDE].mean())
+    return [np.concatenate(found) for found in errors], np.concatenate(times)

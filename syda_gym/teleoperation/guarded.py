@@ -49,6 +49,11 @@ class GuardedMapping:
             raise TeleoperationError(
                 f"{mapping!r} ends at {mapping.target.name!r}, which is no robot; choose a route that ends at one"
             )
+        if mapping.window:
+            raise TeleoperationError(
+                f"{mapping!r} looks at {mapping.window} past frames; live teleoperation maps single frames: fit "
+                "without window"
+            )
         self.mapping = mapping
         self.robot: Robot = mapping.target
         self.links = mapping.links if isinstance(mapping, ChainMapping) else (mapping,)

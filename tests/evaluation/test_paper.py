@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from syda_gym.errors import MotionError, OptionError
-from syda_gym.evaluation.paper import CONTENDERS, Study, compute_cell, reproduce
+from syda_gym.evaluation.few_shot import few_shot
+from syda_gym.evaluation.paper import Study, reproduce
+from syda_gym.evaluation.paper_cells import CONTENDERS, CellTask
 from syda_gym.evaluation.paper_report import PRINTED, overview, tables
 from syda_gym.mappings import METHODS
 from syda_gym.mappings.validation import cross_validate
@@ -104,14 +106,45 @@ def test_an_interrupted_study_goes_on(studied, spec):
     assert again.cells[key].error == study.cells[key].error
 
 
+def test_a_study_that_is_killed_and_continued_writes_the_same_tables(spec, tmp_path, monkeypatch):
+    monkeypatch.setattr("syda_gym.evaluation.paper.CONTENDERS", tuple(c for c in CONTENDERS if c.name == QUICK[0]))
+    arguments = {"seeds": 1, "protocols": ["loao"], "workers": 1}
+
+    def killed(_: float, name: str) -> None:
+        if name.endswith("kid"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        reproduce(spec, tmp_path / "killed", progress=killed, **arguments)
+    left = {path.name for path in (tmp_path / "killed" / "cells").iterdir()}
+    assert 0 < len(left) < 6
+    seen: list[str] = []
+    reproduce(spec, tmp_path / "killed", progress=lambda _, name: seen.append(name), **arguments)
+    assert len(seen) == 6 - len(left)
+    reproduce(spec, tmp_path / "whole", **arguments)
+    for name in ("table2", "overview_loao", "few_shot", "windows"):
+        tables = [(tmp_path / run / f"{name}.csv").read_text() for run in ("killed", "whole")]
+        assert tables[0] == tables[1]
+        assert len(tables[0].splitlines()) > 1
+
+
+def test_a_chain_needs_fewer_recordings_than_a_direct_pair(small_motions):
+    rows = few_shot(small_motions, "adult", "kid", "pepper", draws=2, counts=(1, 3, 99))
+    assert [row.count for row in rows] == [1, 3]
+    assert rows[0].chain < rows[0].direct
+    assert rows[0].direct > rows[1].direct
+    with pytest.raises(OptionError, match="at least 1"):
+        few_shot(small_motions, "adult", "kid", "pepper", draws=0)
+
+
 def test_a_network_cell_runs_over_seeds(spec):
     from dataclasses import replace
 
     contender = replace(CONTENDERS[0], bounds=0)
-    cell = compute_cell((spec, contender, "rand3", "kid", 2))
-    assert not isinstance(cell, str)
-    assert len(cell.error) == len(cell.error_back) == len(cell.chain) == 2
-    assert cell.error[0] != cell.error[1]
+    cell = CellTask(spec, contender, "rand3", "kid", 2).compute()
+    assert isinstance(cell, dict)
+    assert len(cell["error"]) == len(cell["error_back"]) == len(cell["chain"]) == 2
+    assert cell["error"][0] != cell["error"][1]
 
 
 def test_every_method_takes_part():

@@ -99,7 +99,7 @@ def test_between_humans_the_general_preset_is_a_hop(adult_kid, tmp_path):
 
 
 def test_the_lag_of_a_recording_is_found(adult_pepper):
-    from syda_gym.mappings.arm_problem import ArmProblem
+    from syda_gym.mappings.arm_problem import ArmProblem, Coding
 
     late = adult_pepper.target.copy()
     rows = adult_pepper.recordings == "take1"
@@ -114,7 +114,7 @@ def test_the_lag_of_a_recording_is_found(adult_pepper):
         recordings=adult_pepper.recordings,
         times=adult_pepper.times,
     )
-    lags = ArmProblem.build(pair, 0, 6).lags
+    lags = ArmProblem.build(pair, 0, Coding(6)).lags
     assert lags["take1"] == 3
     assert abs(lags["take0"]) <= 1
 

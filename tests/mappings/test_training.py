@@ -90,6 +90,23 @@ def test_a_batched_model_is_the_model_alone():
                 assert np.allclose(mine, other, atol=1e-5)
 
 
+def test_small_groups_give_what_one_large_group_gives(monkeypatch):
+    from dataclasses import replace
+
+    settings = replace(SMALL, epochs=5, cosine=True, decay=0.01)
+    tables = jobs([40, 16, 40, 33, 16])
+    seen: list[float] = []
+    together = train(tables, settings)
+    monkeypatch.setattr("syda_gym.mappings.training._CACHE", 3000)  # room for two models of this size
+    apart = train(tables, settings, seen.append)
+    assert seen == sorted(seen)
+    assert seen[-1] == pytest.approx(1.0)
+    for one, two in zip(together, apart, strict=True):
+        for name, stack in one.items():
+            for mine, other in zip(stack.weights, two[name].weights, strict=True):
+                assert np.allclose(mine, other, atol=1e-5)
+
+
 def test_the_same_seed_gives_the_same_bits():
     first, second = (train(jobs([40, 30]), SMALL) for _ in range(2))
     for one, two in zip(first, second, strict=True):
