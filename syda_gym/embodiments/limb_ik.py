@@ -19,6 +19,7 @@ __all__ = ["LimbIK"]
 
 _EXACT = 1e-7  # m; a closed-form solution nearer than this needs no refinement
 _STEPS = 60
+_FEW = 30  # below so many rows, steps in plain floats are faster than in numpy
 
 
 class LimbIK:
@@ -136,6 +137,25 @@ class _ArmIK:
 
     def solve(self, frames: FloatArray, unit: FloatArray) -> FloatArray:
         """Writes this arm's angles into ``frames`` for directions ``(N, 2, 3)``."""
+        if self.single is None or not self.single.exact:
+            return self._search(frames, unit)
+        # Row by row in plain floats: most rows are solved at once, and numpy would work on all candidates of all rows.
+        wanted = [(tuple(upper), tuple(fore)) for upper, fore in unit.tolist()]
+        found = [self.single.solved(*limbs) for limbs in wanted]
+        missing = [row for row, angles in enumerate(found) if angles is None]
+        result = frames.copy()
+        if len(missing) <= _FEW:
+            for row in missing:
+                found[row] = self.single.solve(*wanted[row])
+        else:
+            result[missing] = self._search(frames[missing], unit[missing])
+        solved = [row for row, angles in enumerate(found) if angles is not None]
+        if solved:
+            result[solved, self.part] = np.array([found[row] for row in solved])
+        return result
+
+    def _search(self, frames: FloatArray, unit: FloatArray) -> FloatArray:
+        """The best of the candidates within the limits, moved nearer where it misses."""
         upper = unit[:, 0] * self.lengths[0]
         goal = np.concatenate([upper, upper + unit[:, 1] * self.lengths[1]], axis=1)
         best, error = frames, np.full(len(frames), np.inf)

@@ -79,7 +79,7 @@ class SingleArmIK:
             fore: unit direction of the forearm.
         """
         if self.exact:
-            solved = self._solved(upper, fore)
+            solved = self.solved(upper, fore)
             if solved is not None:
                 return solved
         goal_elbow = _scaled(upper, self.lengths[0])
@@ -93,8 +93,16 @@ class SingleArmIK:
                 best, least, miss = angles, score, error
         return best if miss <= EXACT else self._refine(best, goal)
 
-    def _solved(self, upper: Vector, fore: Vector) -> list[float] | None:
-        """Of the closed-form solutions within the limits the one nearest to rest; most frames need nothing else."""
+    def solved(self, upper: Vector, fore: Vector) -> list[float] | None:
+        """Of the closed-form solutions within the limits the one nearest to rest; most frames need nothing else.
+
+        Args:
+            upper: unit direction of the upper arm in the torso frame.
+            fore: unit direction of the forearm.
+
+        Returns:
+            Joint angles [rad] of the arm, ``None`` if the limits allow no solution.
+        """
         (w0, r0), (w1, r1), (w2, r2), (w3, r3) = self._windows
         real, elbows = self._to_elbow.solve(upper)
         best, least = None, math.inf

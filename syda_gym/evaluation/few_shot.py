@@ -7,6 +7,7 @@ every action unseen by whatever leads into the robot.
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Dict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -123,7 +124,7 @@ def _draw(names: Sequence[str], count: int, *seed: int) -> list[str]:
     return [names[index] for index in sorted(rng.choice(len(names), count, replace=False))]
 
 
-def _score(mappings: dict[str, Mapping] | dict[str, CodedMapping], tests: dict[str, PairedMotions]) -> float:
+def _score(mappings: Dict[str, Mapping], tests: dict[str, PairedMotions]) -> float:
     """Mean landmark error over all rows, each action by its own mapping [m]."""
     errors = [
         landmark_error(test.target_body, mappings[name](test.source), test.target) for name, test in tests.items()

@@ -14,10 +14,9 @@ from syda_gym.errors import OptionError
 from syda_gym.mappings.arm_problem import ArmProblem, Coding, fit_problems
 from syda_gym.mappings.coded import CodedMapping
 from syda_gym.mappings.jobs import FitJob
-from syda_gym.mappings.nested import choose_hop_shrinkage, choose_noise
+from syda_gym.mappings.nested import Choice, choose_hop_shrinkage, choose_input
 from syda_gym.mappings.regressors import DirectRegressor, DualRegressor, Regressor
 from syda_gym.mappings.residual import HopRegressor
-from syda_gym.mappings.scaling import Scaler
 from syda_gym.mappings.settings import TrainingSettings
 from syda_gym.mappings.syda import with_options
 from syda_gym.mappings.training import Job, Progress, train
@@ -65,6 +64,7 @@ INTERPOLATION = TrainingSettings(
 """For test poses that come from trained actions: capacity pays there."""
 
 _LAG = 6
+_RECIPE = Choice()
 _ROWS_PER_STEP = 32
 
 
@@ -79,7 +79,7 @@ def fit_general(jobs: Sequence[FitJob], progress: Progress | None = None) -> lis
 
 
 def fit_nested(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
-    """``general`` with its input noise chosen among the training actions, see ``nested``; options alike."""
+    """``general`` with input noise and scaling chosen among the training actions, see ``nested``; options alike."""
     return _fit(jobs, GENERAL, "syda", progress, select=True)
 
 
@@ -155,26 +155,30 @@ def fit_hops(problems: Sequence[ArmProblem], shrinkage: float | None) -> list[Re
 def _fit_selected(
     problems: Sequence[ArmProblem], settings: TrainingSettings, progress: Progress | None
 ) -> list[Regressor]:
-    """Networks whose input noise each training set chose for itself; equal choices train together."""
+    """Networks whose input noise and scaling each training set chose for itself; equal choices train together."""
     distinct = {id(problem.pair): problem for problem in problems}
-    chosen = {key: choose_noise(problem) for key, problem in distinct.items()}
-    noises = [chosen[id(problem.pair)] for problem in problems]
+    chosen = {key: choose_input(problem) for key, problem in distinct.items()}
+    choices = [chosen[id(problem.pair)] for problem in problems]
     fitted: dict[int, Regressor] = {}
-    for noise in sorted(set(noises)):
-        places = [place for place, own in enumerate(noises) if own == noise]
-        models = fit_networks([problems[place] for place in places], replace(settings, noise=noise), progress)
+    for choice in sorted(set(choices)):
+        places = [place for place, own in enumerate(choices) if own == choice]
+        own_settings = replace(settings, noise=choice.noise)
+        models = fit_networks([problems[place] for place in places], own_settings, progress, choice)
         fitted.update(zip(places, models, strict=True))
     return [fitted[place] for place in range(len(problems))]
 
 
 def fit_networks(
-    problems: Sequence[ArmProblem], settings: TrainingSettings, progress: Progress | None
+    problems: Sequence[ArmProblem],
+    settings: TrainingSettings,
+    progress: Progress | None,
+    choice: Choice = _RECIPE,
 ) -> list[Regressor]:
     """Trains one network per problem on its rows, all together."""
     scales, data = [], []
     for problem in problems:
         x, y = problem.rows
-        scale_a, scale_b = Scaler.fit(x), Scaler.fit(y)
+        scale_a, scale_b = choice.scale(x), choice.scale(y)
         scales.append((scale_a, scale_b))
         data.append(Job(scale_a(x), scale_b(y), problem.seed))
     # Larger recordings take larger batches, not more steps: the time of a fit stays the same.

@@ -13,8 +13,8 @@ import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import MappingError, OptionError
-from syda_gym.mappings.arm_coders import HumanArmCoder, RobotArmCoder
-from syda_gym.mappings.arm_problem import ArmProblem, Coding, fit_problems
+from syda_gym.mappings.arm_coders import HumanArmCoder
+from syda_gym.mappings.arm_problem import ArmCoder, ArmProblem, Coding, fit_problems
 from syda_gym.mappings.coded import CodedMapping
 from syda_gym.mappings.general import take_options
 from syda_gym.mappings.jobs import FitJob
@@ -116,7 +116,7 @@ def _regressor(problem: ArmProblem, calibrated: bool) -> GeometricRegressor:
     return GeometricRegressor(rotation, _share(problem.source_coder), _share(problem.target_coder))
 
 
-def _share(coder: HumanArmCoder | RobotArmCoder) -> float:
+def _share(coder: ArmCoder) -> float:
     return float(coder.lengths[0] / coder.lengths.sum()) if isinstance(coder, HumanArmCoder) else 0.0
 
 

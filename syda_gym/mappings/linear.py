@@ -35,7 +35,14 @@ class Ridge(Regressor):
 
     @classmethod
     def fit(
-        cls, source: FloatArray, target: FloatArray, shrinkage: float, *, robust: bool = False, rounds: int = 10
+        cls,
+        source: FloatArray,
+        target: FloatArray,
+        shrinkage: float,
+        *,
+        robust: bool = False,
+        rounds: int = 10,
+        scale: Scaler | None = None,
     ) -> Ridge:
         """Fits rows ``(N, D)`` to rows ``(N, E)``.
 
@@ -45,8 +52,9 @@ class Ridge(Regressor):
             shrinkage: penalty in units of the inputs' variance.
             robust: weigh rows by 1 / max(residual, median residual), iteratively (L1-like).
             rounds: of the reweighting.
+            scale: of the inputs; each feature by its own standard deviation if ``None``.
         """
-        scale = Scaler.fit(source)
+        scale = Scaler.fit(source) if scale is None else scale
         inputs = scale(source)
         weights = np.ones(len(inputs))
         model = cls._weighted(scale, inputs, target, shrinkage, weights)

@@ -9,6 +9,7 @@ expectation, a ridge with penalty s^2 (Bishop 1995, *Training with noise is equi
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,8 +17,10 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.mappings.arm_coders import HumanArmCoder
 from syda_gym.mappings.arm_problem import ArmCoder, ArmProblem, action_groups
 from syda_gym.mappings.linear import Ridge
+from syda_gym.mappings.scaling import Scaler
+from syda_gym.mappings.window_coder import WindowCoder
 
-__all__ = ["HOP_SHRINKAGES", "NOISES", "choose_hop_shrinkage", "choose_noise"]
+__all__ = ["HOP_SHRINKAGES", "NOISES", "Choice", "choose_hop_shrinkage", "choose_input"]
 
 NOISES = (0.1, 0.2, 0.3, 0.45, 0.7, 1.0)
 """Candidates for the input noise, in standard deviations; fixed in advance."""
@@ -25,19 +28,47 @@ NOISES = (0.1, 0.2, 0.3, 0.45, 0.7, 1.0)
 HOP_SHRINKAGES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Candidates for the penalty of a hop between bodies of one kind, weakest first; fixed in advance."""
 
-_FALLBACK_NOISE = 0.3
 _FALLBACK_SHRINKAGE = 10.0
 _LEAST_ACTIONS = 3
 _MAX_ROWS = 2000
+
+
+@dataclass(frozen=True, order=True)
+class Choice:
+    """How a network's inputs are prepared.
+
+    Attributes:
+        noise: of the inputs, in standard deviations.
+        by_vector: one scale for each vector in space rather than for each coordinate.
+    """
+
+    noise: float = 0.3
+    by_vector: bool = False
+
+    def scale(self, rows: FloatArray) -> Scaler:
+        """The standardisation of codes ``(N, D)``."""
+        return Scaler.by_vector(rows) if self.by_vector else Scaler.fit(rows)
+
+
+CHOICES = tuple(Choice(noise, by_vector) for by_vector in (False, True) for noise in NOISES)
 
 Predict = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 """Fits inputs to outputs and predicts the outputs of further inputs."""
 
 
-def choose_noise(problem: ArmProblem) -> float:
-    """The input noise whose stand-in errs least on held-out training actions; 0.3 with fewer than three actions."""
-    errors = _errors(problem, [_ridge(noise**2) for noise in NOISES])
-    return _FALLBACK_NOISE if errors is None else NOISES[int(np.argmin(errors.mean(axis=1)))]
+def choose_input(problem: ArmProblem) -> Choice:
+    """The choice whose stand-in errs least on held-out training actions, both ways taken together.
+
+    The errors of each way are measured in units of the least of them, because a model maps both ways and humans are
+    larger than robots. The recipe's own choice with fewer than three actions.
+    """
+    source, target = problem.main
+    stand_ins = [_ridge(choice) for choice in CHOICES]
+    there = _errors(problem, source, target, problem.target_coder, stand_ins)
+    back = _errors(problem, target, source, problem.source_coder, stand_ins)
+    if there is None or back is None:
+        return Choice()
+    return CHOICES[int(np.argmin(sum(way.mean(axis=1) / way.mean(axis=1).min() for way in (there, back))))]
 
 
 def choose_hop_shrinkage(problem: ArmProblem) -> float:
@@ -46,7 +77,9 @@ def choose_hop_shrinkage(problem: ArmProblem) -> float:
     The one-standard-error rule (Breiman et al. 1984) because a hop that follows its recording session too closely
     ruins the chain that it is part of, which the pair's own frames cannot tell.
     """
-    errors = _errors(problem, [_hop(shrinkage) for shrinkage in HOP_SHRINKAGES])
+    source, target = problem.main
+    hops = [_hop(shrinkage) for shrinkage in HOP_SHRINKAGES]
+    errors = _errors(problem, source, target, problem.target_coder, hops)
     if errors is None:
         return _FALLBACK_SHRINKAGE
     means = errors.mean(axis=1)
@@ -55,27 +88,28 @@ def choose_hop_shrinkage(problem: ArmProblem) -> float:
     return max(value for value, mean in zip(HOP_SHRINKAGES, means, strict=True) if mean <= limit)
 
 
-def _ridge(shrinkage: float) -> Predict:
-    return lambda x, y, new: Ridge.fit(x, y, shrinkage)(new)
+def _ridge(choice: Choice) -> Predict:
+    return lambda x, y, new: Ridge.fit(x, y, choice.noise**2, scale=choice.scale(x))(new)
 
 
 def _hop(shrinkage: float) -> Predict:
     return lambda x, y, new: new + Ridge.fit(x, y - x, shrinkage)(new)
 
 
-def _errors(problem: ArmProblem, candidates: Sequence[Predict]) -> FloatArray | None:
+def _errors(
+    problem: ArmProblem, source: FloatArray, target: FloatArray, coder: ArmCoder, candidates: Sequence[Predict]
+) -> FloatArray | None:
     """Landmark errors ``(candidates, groups)`` [m] on training actions held out in turn, ``None`` with too few."""
     groups = action_groups(problem.pair)
     if len(groups) < _LEAST_ACTIONS:
         return None
-    source, target = problem.main
     errors = np.empty((len(candidates), len(groups)))
     for column, names in enumerate(groups):
         held_out = np.isin(problem.pair.actions, names)
         x, y = (_thinned(codes[~held_out]) for codes in (source, target))
         new, wanted = (_thinned(codes[held_out]) for codes in (source, target))
         for row, predict in enumerate(candidates):
-            errors[row, column] = _gap(problem.target_coder, predict(x, y, new), wanted)
+            errors[row, column] = _gap(coder, predict(x, y, new), wanted)
     return errors
 
 
@@ -87,11 +121,12 @@ def _thinned(codes: FloatArray) -> FloatArray:
 
 def _gap(coder: ArmCoder, predicted: FloatArray, wanted: FloatArray) -> float:
     """Mean distance of elbow and wrist [m] as their codes place them, without regard to joint limits."""
-    if isinstance(coder, HumanArmCoder):
-        places = ((predicted - wanted)[:, -12:-6] * coder.lengths.sum()).reshape(-1, 2, 3)
+    human = coder.inner if isinstance(coder, WindowCoder) else coder
+    if isinstance(human, HumanArmCoder):
+        places = ((predicted - wanted)[:, -12:-6] * human.lengths.sum()).reshape(-1, 2, 3)
     else:
         limbs = predicted.reshape(-1, 2, 3)
         limbs = limbs / np.maximum(np.linalg.norm(limbs, axis=-1, keepdims=True), 1e-9)
-        lengths = coder.body.arm_lengths.mean(axis=0)
+        lengths = human.robot.arm_lengths.mean(axis=0)
         places = np.cumsum((limbs - wanted.reshape(-1, 2, 3)) * lengths[:, None], axis=1)
     return float(np.linalg.norm(places, axis=-1).mean())

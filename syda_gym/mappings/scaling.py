@@ -32,6 +32,15 @@ class Scaler:
         return cls(rows.mean(axis=0), np.maximum(rows.std(axis=0), _LEAST))
 
     @classmethod
+    def by_vector(cls, rows: FloatArray, size: int = 3) -> Scaler:
+        """Mean of each feature and one standard deviation for every ``size`` features.
+
+        All directions in space then count alike, as they do not where each coordinate is scaled by itself.
+        """
+        spread = np.sqrt(np.mean(rows.std(axis=0).reshape(-1, size) ** 2, axis=1))
+        return cls(rows.mean(axis=0), np.maximum(np.repeat(spread, size), _LEAST))
+
+    @classmethod
     def identity(cls, width: int) -> Scaler:
         """Leaves codes as they are."""
         return cls(np.zeros(width), np.ones(width))

@@ -145,7 +145,7 @@ def held_out_errors(pair: PairedMotions, folds: Sequence[Fold], protocol: str) -
         for fold in group:
             test, mapping = fold.test, fold.mapping
             raw = map_clips(mapping, test, raw=True)
-            mapped = map_clips(mapping, test)
+            mapped = mapping.target.clamp(raw) if isinstance(mapping.target, Robot) else raw
             forward.append(landmark_error(test.target_body, mapped, test.target))
             names.append(test.actions)
             if isinstance(mapping.target, Robot):

@@ -8,7 +8,7 @@ import pytest
 from syda_gym.embodiments import landmark_error
 from syda_gym.mappings import fit, fit_many
 from syda_gym.mappings.arm_problem import ArmProblem, Coding
-from syda_gym.mappings.nested import HOP_SHRINKAGES, NOISES, choose_hop_shrinkage, choose_noise
+from syda_gym.mappings.nested import HOP_SHRINKAGES, NOISES, Choice, choose_hop_shrinkage, choose_input
 from syda_gym.motions.clip import PairedMotions
 
 
@@ -41,8 +41,8 @@ def shuffled(pair: PairedMotions) -> PairedMotions:
 
 
 def test_where_there_is_nothing_to_learn_the_most_noise_is_chosen(adult_pepper):
-    assert choose_noise(problem(adult_pepper)) < 0.5
-    assert choose_noise(problem(shuffled(adult_pepper))) == NOISES[-1]
+    assert choose_input(problem(adult_pepper)).noise < 0.5
+    assert choose_input(problem(shuffled(adult_pepper))).noise == NOISES[-1]
 
 
 def test_a_hop_follows_its_recordings_only_where_that_helps(adult_kid):
@@ -63,7 +63,7 @@ def test_the_held_out_action_takes_no_part(adult_pepper):
 
 
 def test_two_actions_are_too_few_to_choose(adult_pepper, adult_kid):
-    assert choose_noise(problem(adult_pepper.only_actions(["reach0", "reach1"]))) == pytest.approx(0.3)
+    assert choose_input(problem(adult_pepper.only_actions(["reach0", "reach1"]))) == Choice(0.3, False)
     assert choose_hop_shrinkage(problem(adult_kid.only_actions(["reach0", "reach1"]))) == pytest.approx(10.0)
 
 
