@@ -20,11 +20,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Job", "Progress", "TrainingSettings", "train"]
 
-_CACHE = 1_600_000
-"""Floats that a group of models may keep busy, about 6 MB."""
-
-_COPIES = 4
-"""Weights, gradient and the two moments of Adam."""
+_WORK = 20_000_000
+"""Multiplications in one pass forward of a group of models. With fewer, calls cost more than arithmetic; with more,
+the group outgrows the processor's cache."""
 
 Progress = Callable[[float], None]
 """Called with the finished fraction, 0 to 1."""
@@ -84,16 +82,11 @@ def train(jobs: Sequence[Job], settings: TrainingSettings, progress: Progress | 
 
 
 def _groups(jobs: Sequence[Job], settings: TrainingSettings, widths: tuple[int, int]) -> list[list[int]]:
-    """Jobs that train together: as many as fit the processor's cache, those with equally many rows side by side.
-
-    Models with equally many rows need no masks; a group that outgrows the cache waits for memory.
-    """
-    layers = [width for stack in settings.stacks(*widths).values() for width in stack]
+    """Jobs that train together; those with equally many rows side by side, because they need no masks."""
     weights = sum(
-        a * b + b for stack in settings.stacks(*widths).values() for a, b in zip(stack[:-1], stack[1:], strict=True)
+        a * b for stack in settings.stacks(*widths).values() for a, b in zip(stack[:-1], stack[1:], strict=True)
     )
-    floats = _COPIES * weights + settings.batch * sum(layers)
-    most = max(1, _CACHE // floats)
+    most = max(1, _WORK // (settings.batch * weights))
     counts = Counter(len(job.a) for job in jobs)
     order = sorted(range(len(jobs)), key=lambda index: len(jobs[index].a))
     groups: list[list[int]] = [[]]

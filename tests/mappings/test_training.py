@@ -97,7 +97,7 @@ def test_small_groups_give_what_one_large_group_gives(monkeypatch):
     tables = jobs([40, 16, 40, 33, 16])
     seen: list[float] = []
     together = train(tables, settings)
-    monkeypatch.setattr("syda_gym.mappings.training._CACHE", 3000)  # room for two models of this size
+    monkeypatch.setattr("syda_gym.mappings.training._WORK", 5000)  # room for two models of this size
     apart = train(tables, settings, seen.append)
     assert seen == sorted(seen)
     assert seen[-1] == pytest.approx(1.0)
