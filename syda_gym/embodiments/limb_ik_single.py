@@ -57,9 +57,7 @@ class SingleArmIK:
         self.upper: list[float] = chain.upper.tolist()
         self.middle = [0.5 * (low + high) for low, high in zip(self.lower, self.upper, strict=True)]
         # Per mover: where a whole turn about mid-range starts, the limits, and the angle at rest.
-        self._windows = [
-            ((self.middle[j] - math.pi, self.lower[j], self.upper[j]), self.rest[j]) for j in self.movers
-        ]
+        self._windows = [((self.middle[j] - math.pi, self.lower[j], self.upper[j]), self.rest[j]) for j in self.movers]
         self.axes: list[Vector] = [tuple(axis) for axis in axes.tolist()]
         self.couplings = [(j, by, at.tolist(), low.tolist(), high.tolist()) for j, by, at, low, high in couplings]
         self.carriers = chain.point_joints[:3]

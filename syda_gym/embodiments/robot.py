@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import yaml
@@ -19,6 +19,9 @@ from syda_gym.embodiments.embodiment import SIDES, Embodiment, Feature, FloatArr
 from syda_gym.embodiments.urdf import arm_chain, read_urdf
 from syda_gym.errors import EmbodimentError, nearest_name
 from syda_gym.files import fingerprint
+
+if TYPE_CHECKING:
+    from syda_gym.embodiments.limb_ik import LimbIK
 
 __all__ = ["ArmDescription", "CoupledLimit", "Robot", "RobotDescription"]
 
@@ -196,6 +199,13 @@ class Robot(Embodiment):
         points = self.arm_points(np.zeros(len(self.joint_names)))[0]
         lengths: FloatArray = np.linalg.norm(np.diff(points, axis=1), axis=-1)
         return lengths
+
+    @cached_property
+    def limb_ik(self) -> LimbIK:
+        """Inverse kinematics on limb directions, made once per robot."""
+        from syda_gym.embodiments.limb_ik import LimbIK
+
+        return LimbIK(self)
 
     def arm_points(self, frames: ArrayLike) -> FloatArray:
         """Shoulder, elbow and wrist of each arm, ``(N, arms, 3, 3)`` [m], torso frame."""

@@ -15,7 +15,6 @@ import numpy as np
 from syda_gym.embodiments.arm_chain import ArmChain
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray, Side
 from syda_gym.embodiments.human import HumanSkeleton
-from syda_gym.embodiments.limb_ik import LimbIK
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MappingError
 from syda_gym.mappings.coders import Arrays, Coder
@@ -195,7 +194,7 @@ class RobotArmCoder(Coder):
         self._signs = np.array([_MIRROR if side == "right" else np.ones(3) for side in self.sides])
         self.rest = _shaped(arrays, "rest", (body.n_features,))
         self._lateral: list[float] = self._signs[:, 1].tolist()
-        self._ik = LimbIK(body)
+        self._ik = body.limb_ik
         self.extra_columns, self.extra_signs = self._extras()
         idle = np.ones(body.n_features, dtype=bool)
         for arm in self._arms:
