@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from syda_gym.agents.agent import Agent
 from syda_gym.agents.classical import Lead
+from syda_gym.agents.contact_term import ContactTerm
 from syda_gym.agents.figures import JOINT_WEIGHT, Figures
-from syda_gym.agents.interface import Interface, lag_share
+from syda_gym.agents.interface import Interface, Reading, lag_share
 from syda_gym.agents.predictor import Predictor, input_count, network_inputs
+from syda_gym.agents.projection import capsule_model
 from syda_gym.agents.streams import Streams, play_streams, read_stream, score_streams
 from syda_gym.agents.tcn import TcnShape, receptive_field
 from syda_gym.embodiments.embodiment import FloatArray
@@ -25,8 +27,11 @@ if TYPE_CHECKING:
 
 __all__ = ["BLIND", "PredictorConfig", "TrainedPredictor", "train_predictor"]
 
-BLIND = ("base", "ema", "one_euro", "kalman")
+BLIND = ("base", "ema", "one_euro", "kalman", "projection")
 """Agents that a predictor can stand on: their commands do not depend on the joint angles."""
+
+TOUCHING_MM = 20.0
+"""What a step in contact counts when rounds of training with a contact weight are compared [mm]."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,9 @@ class PredictorConfig:
         rounds: how often the network is played in the servo model to renew the joint angles it reads, and judged on the
             validation streams.
         mirror: whether to train on left-right mirror images as well.
+        contact_weight: of a millimetre by which shapes come nearer than ``contact_margin``, against the landmark error;
+            0 leaves contacts out. The base should then be a ``Projection``.
+        contact_margin: clearance that costs nothing [m].
     """
 
     channels: int = 48
@@ -61,6 +69,8 @@ class PredictorConfig:
     bound: float = 0.6
     rounds: int = 3
     mirror: bool = True
+    contact_weight: float = 0.0
+    contact_margin: float = 0.0005
 
     def __post_init__(self) -> None:
         for name in ("channels", "iterations", "batch", "window", "rounds"):
@@ -70,6 +80,11 @@ class PredictorConfig:
             raise AgentError(f"predictor: {self.rounds} rounds need at least as many iterations, got {self.iterations}")
         if not 0.0 <= self.averaging < 1.0:
             raise AgentError(f"predictor: averaging must be at least 0 and below 1, got {self.averaging}")
+        if not (self.contact_weight >= 0.0 and 0.0 <= self.contact_margin <= 0.1):
+            raise AgentError(
+                "predictor: expected contact_weight >= 0 and 0 <= contact_margin <= 0.1 m, got "
+                f"{self.contact_weight} and {self.contact_margin}"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,20 +141,45 @@ def train_predictor(
         )
     torch.set_num_threads(1)
     trainer = _Trainer(base, train, rates, settings, seed)
+    capsules = capsule_model(base.interface.robot) if settings.contact_weight else None
     history, snapshots = [], []
     per_round = np.diff(np.linspace(0, settings.iterations, settings.rounds + 1).round().astype(int))
     for index in range(settings.rounds + 1):
         snapshots.append(trainer.weights())
-        agent = trainer.agent(snapshots[-1])
-        history.append(score_streams(agent, validation, rates))
+        history.append(score_streams(trainer.agent(snapshots[-1]), validation, rates, capsules=capsules))
         if index < settings.rounds:
-            trainer.renew(play_streams(agent, trainer.streams, rates))
+            trainer.renew()
             trainer.run(int(per_round[index]))
         if progress is not None:
             progress(index / settings.rounds)
-    best = int(np.argmin([f.landmark_mm + JOINT_WEIGHT * f.joint_mrad + settings.jitter_weight * f.jitter
-                          for f in history]))  # fmt: skip
+    best = int(np.argmin([_cost(figures, settings) for figures in history]))
     return TrainedPredictor(trainer.agent(snapshots[best]), tuple(history), best)
+
+
+def _cost(figures: Figures, config: PredictorConfig) -> float:
+    """By what rounds are compared; a step in contact counts as an error of two centimetres."""
+    touching = TOUCHING_MM * figures.contact_steps if config.contact_weight else 0.0
+    return figures.landmark_mm + JOINT_WEIGHT * figures.joint_mrad + config.jitter_weight * figures.jitter + touching
+
+
+class _Known(Agent):
+    """Replays commands that were computed before; the agents that it stands for may be slow."""
+
+    name = "known"
+
+    def __init__(self, interface: Interface, commands: FloatArray) -> None:
+        super().__init__(interface)
+        self._commands = commands
+
+    def reset(self, count: int, seed: int | None = None) -> None:
+        """Goes back to the first step."""
+        super().reset(count, seed)
+        self._step = 0
+
+    def improve(self, command: FloatArray, reading: Reading) -> FloatArray:
+        """The command of the next step."""
+        self._step += 1
+        return self._commands[:, self._step - 1]
 
 
 class _Trainer:
@@ -174,6 +214,7 @@ class _Trainer:
         self._response = response(_motor_shares(self.streams, rates, config), self._window)
         self._inputs = torch.zeros(0)
         self._commands = torch.as_tensor(self._below, dtype=torch.float32)
+        self._contact = ContactTerm(self.interface.robot, config.contact_margin) if config.contact_weight else None
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
         """The running average of the weights."""
@@ -181,14 +222,21 @@ class _Trainer:
 
     def agent(self, weights: dict[str, NDArray[np.float32]]) -> Agent:
         """The stack with given weights."""
+        return self._stack(self.base, weights)
+
+    def _stack(self, base: Agent, weights: dict[str, NDArray[np.float32]]) -> Agent:
         c = self.config
-        predictor = Predictor(self.interface, self.base, weights=weights, channels=c.channels, bound=c.bound)
+        predictor = Predictor(self.interface, base, weights=weights, channels=c.channels, bound=c.bound)
         return Lead(self.interface, predictor, strength=c.strength)
 
-    def renew(self, q_after: FloatArray) -> None:
-        """Takes the joint angles that the current network led to as what the network sees next."""
+    def renew(self) -> None:
+        """Takes the joint angles that the current network leads to as what the network sees next."""
         import torch
 
+        agent = self._stack(_Known(self.interface, self._below), self.weights())
+        q_after = play_streams(agent, self.streams, self.rates)
+        if self._contact is not None:
+            self._contact.renew(q_after)
         before = np.concatenate([self.streams.base[:, :1], q_after[:, :-1]], axis=1)
         last = np.concatenate([self._below[:, :1], self._below[:, :-1]], axis=1)
         inputs = network_inputs(self.interface, self._below, last, self.streams.base, before, self.streams.age)
@@ -240,7 +288,10 @@ class _Trainer:
         landmark = 1e3 * _masked(_length(points - targets).mean(-1), mask)
         joint = 1e3 * _masked((q - self._reference[at]).abs().mean(-1), mask)
         jitter = 1e3 * _masked(_length(torch.diff(points, n=3, dim=1)).mean(-1), mask[:, 3:])
-        return landmark + JOINT_WEIGHT * joint + self.config.jitter_weight * jitter
+        loss = landmark + JOINT_WEIGHT * joint + self.config.jitter_weight * jitter
+        if self._contact is not None:
+            loss = loss + self.config.contact_weight * _masked(self._contact(at, q), mask)
+        return loss
 
 
 def commands_below(base: Agent, streams: Streams) -> FloatArray:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 
 from syda_gym.agents.agent import BaseAlone
 from syda_gym.agents.avoidance import avoiding
 from syda_gym.agents.classical import make_rival
+from syda_gym.agents.contact_term import ContactTerm
 from syda_gym.agents.figures import jitter
+from syda_gym.agents.predictor_training import PredictorConfig, train_predictor
 from syda_gym.agents.projection import Projection, capsule_model
 from syda_gym.agents.streams import Streams, score_streams
 from syda_gym.errors import AgentError
@@ -76,3 +79,35 @@ def test_avoiding_leaves_motions_without_contact_as_they_are(interface):
 def test_a_margin_out_of_range_is_refused(interface):
     with pytest.raises(AgentError, match="margin"):
         Projection(interface, BaseAlone(interface), margin=-0.1)
+
+
+def test_overlap_costs_its_depth_and_pushes_out(interface, crossing):
+    model = capsule_model(interface.robot)
+    term = ContactTerm(interface.robot, margin=0.01)
+    q = crossing.reference[:, 10:20]
+    term.renew(q)
+    at = (torch.arange(len(q))[:, None], torch.arange(10)[None].expand(len(q), 10))
+    angles = torch.as_tensor(q, dtype=torch.float32).requires_grad_()
+    depth = term(at, angles)
+    distances = np.sort(model.distances(q.reshape(-1, interface.n)), axis=1)[:, :4]
+    expected = 1e3 * np.maximum(0.01 - distances, 0.0).sum(axis=1)
+    assert expected.max() > 5.0
+    assert np.allclose(depth.detach().numpy().ravel(), expected, atol=0.01)
+    depth.sum().backward()
+    moved = q - 1e-4 * angles.grad.numpy() / np.abs(angles.grad.numpy()).max()
+    shallower = term(at, torch.as_tensor(moved, dtype=torch.float32)).detach()
+    assert shallower.sum() < depth.detach().sum()
+
+
+def test_a_predictor_on_the_projection_starts_as_it_and_is_judged_by_contacts_too(interface, crossing, rates):
+    config = PredictorConfig(
+        channels=8, iterations=6, batch=2, window=20, rounds=1, mirror=False, contact_weight=1.0, contact_margin=0.002
+    )
+    base = Projection(interface, BaseAlone(interface), margin=0.0)
+    trained = train_predictor(base, crossing, crossing, rates, config)
+    rival = make_rival("projection_lead", interface, margin=0.0)
+    assert trained.history[0] == score_streams(rival, crossing, rates, capsules=capsule_model(interface.robot))
+    assert len(trained.history) == 2
+    assert trained.agent.stack == ("base", "projection", "predictor", "lead")
+    with pytest.raises(AgentError, match="contact_margin"):
+        PredictorConfig(contact_weight=1.0, contact_margin=1.0)
