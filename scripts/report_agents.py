@@ -193,21 +193,25 @@ def curve_picture(cells: Mapping[tuple[str, str], Cell], path: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(2, 3, figsize=(13, 8))
+    figure, axes = plt.subplots(2, 3, figsize=(13, 8.6))
+    every = list(dict.fromkeys(name for cell in cells.values() for name in cell.conditions()))
     for axis, cell in zip(axes.ravel(), cells.values(), strict=True):
-        names = cell.conditions()
-        for index, name in enumerate(names):
+        for name in cell.conditions():
             x, y = iqm(cell.values(name, "jitter")), iqm(cell.values(name, "landmark_mm"))
             learned = "predictor" in name or "residual" in name
+            colour = plt.cm.tab10(every.index(name) % 10)
             axis.scatter(
-                x, y, s=60, marker="*" if learned else "o", color=plt.cm.tab20(index % 20), zorder=3, label=name
+                x, y, s=90 if learned else 50, marker="*" if learned else "o", color=colour, zorder=3, label=name
             )
         axis.set_title(f"{cell.name} ({cell.level})")
         axis.set_xlabel("jitter [mm/frame³]")
         axis.set_ylabel("landmark error [mm]")
         axis.grid(alpha=0.3)
-        axis.legend(fontsize=7)
-    figure.tight_layout()
+    found = {
+        label: handle for axis in axes.ravel() for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend([found[name] for name in every], every, loc="lower center", ncols=len(every), fontsize=8)
+    figure.tight_layout(rect=(0.0, 0.04, 1.0, 1.0))
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
     plt.close(figure)
