@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,6 +25,9 @@ def benchmark(
     workers: Annotated[
         str, typer.Option("--workers", "-w", help="Processes on this machine, `ray` or `ray:ADDRESS`.", metavar="N")
     ] = "1",
+    motions: Annotated[
+        str, typer.Option("--motions", "-m", help="What to replay instead of the file's.", metavar="SPEC")
+    ] = "",
     parquet: Annotated[bool, typer.Option("--parquet", help="Write Parquet instead of CSV.")] = False,
     show: Annotated[bool, typer.Option("--show", help="Print the configuration with all defaults and stop.")] = False,
 ) -> None:
@@ -33,17 +37,19 @@ def benchmark(
     from syda_gym.motions.loading import load_motions
 
     settings = BenchmarkConfig.read(config) if config else BenchmarkConfig.of(SMALL)
+    if motions:
+        settings = replace(settings, motions=motions)
     if show:
         import yaml
 
         typer.echo(yaml.safe_dump(settings.as_dict(), sort_keys=False), nl=False)
         return
-    motions = load_motions(settings.motions, settings.fps)
+    data = load_motions(settings.motions, settings.fps)
     with _cells() as tell:
         results = run_benchmark(
-            settings, out, workers=workers, motions=motions, parquet=parquet, command=_command(), progress=tell
+            settings, out, workers=workers, motions=data, parquet=parquet, command=_command(), progress=tell
         )
-    page = write_benchmark_report(results, motions, out)
+    page = write_benchmark_report(results, data, out)
     if results.select(kind="episodes").rows:
         _print_table(summary_table(results.select(kind="episodes")))
     for failure in results.about["failures"]:

@@ -28,11 +28,13 @@ class Method:
         presets: preset name to the function that fits; the first one is the default.
         invertible: whether its mappings have an inverse.
         summary: one line for help texts.
+        seeded: whether fits depend on the seed.
     """
 
     presets: dict[str, Fitter]
     invertible: bool
     summary: str
+    seeded: bool = True
 
     @property
     def default(self) -> str:
@@ -55,13 +57,16 @@ METHODS: dict[str, Method] = {
     "direct": Method(
         {"general": fit_direct_general, "paper": fit_direct_paper}, False, "encoder of A, decoder of B, trained one way"
     ),
-    "ridge": Method({"general": fit_ridge}, False, "ridge regression per arm"),
-    "kernel_ridge": Method({"general": fit_kernel_ridge}, False, "kernel ridge regression per arm"),
-    "nearest": Method({"general": fit_nearest}, False, "the most similar training frame"),
+    "ridge": Method({"general": fit_ridge}, False, "ridge regression per arm", seeded=False),
+    "kernel_ridge": Method({"general": fit_kernel_ridge}, False, "kernel ridge regression per arm", seeded=False),
+    "nearest": Method({"general": fit_nearest}, False, "the most similar training frame", seeded=False),
     "geometric": Method(
-        {"procrustes": fit_procrustes, "fixed": fit_fixed_axes}, True, "a rotation, then closed-form inverse kinematics"
+        {"procrustes": fit_procrustes, "fixed": fit_fixed_axes},
+        True,
+        "a rotation, then closed-form inverse kinematics",
+        seeded=False,
     ),
-    "mink": Method({"procrustes": fit_mink}, False, "the same decoded by mink (extra 'ik')"),
+    "mink": Method({"procrustes": fit_mink}, False, "the same decoded by mink (extra 'ik')", seeded=False),
 }
 """Every method by name."""
 

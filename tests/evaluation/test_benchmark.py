@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
@@ -16,6 +20,7 @@ from syda_gym.evaluation.benchmark.pools import Schedule
 from syda_gym.evaluation.benchmark.report import write_benchmark_report
 from syda_gym.evaluation.benchmark.work import Worker, folds_of
 from syda_gym.evaluation.chains import Links, all_routes, check_route
+from syda_gym.mappings.fitting import METHODS, fit
 
 QUICK = {
     "routes": ["adult>pepper", "adult>kid>pepper", "adult>kid"],
@@ -147,15 +152,39 @@ def test_links_share_fits_and_never_see_what_is_held_out(small_motions):
 
 
 def test_cells_differ_in_their_keys_and_change_with_what_decides_the_numbers(small_motions):
-    cells = cells_of(BenchmarkConfig.of({**QUICK, "seeds": 2}), small_motions)
+    settings = {**QUICK, "methods": ["syda", "direct"], "seeds": 2}
+    cells = cells_of(BenchmarkConfig.of(settings), small_motions)
     assert len(cells) == 3 * 2 * 2
     assert len({cell.key for cell in cells}) == len(cells)
-    other = cells_of(BenchmarkConfig.of({**QUICK, "seeds": 2, "folds": 3}), small_motions)
+    other = cells_of(BenchmarkConfig.of({**settings, "folds": 3}), small_motions)
     assert not {cell.key for cell in cells} & {cell.key for cell in other}
 
 
+def test_where_nothing_depends_on_the_seed_only_the_first_one_is_computed(small_motions):
+    config = BenchmarkConfig.of(
+        {
+            "routes": ["adult>pepper"],
+            "methods": ["syda", "nearest"],
+            "disturbances": ["none", "teleop:noise:test"],
+            "seeds": [4, 5, 6],
+            "folds": 2,
+        }
+    )
+    found = {(cell.method, cell.disturbance, cell.seed) for cell in cells_of(config, small_motions)}
+    noisy = {(method, "teleop:noise:test", seed) for method in ("syda", "nearest") for seed in (4, 5, 6)}
+    assert found == noisy | {("syda", "none", 4), ("syda", "none", 5), ("syda", "none", 6), ("nearest", "none", 4)}
+
+
+def test_a_method_without_seed_gives_the_same_numbers_with_any(small_motions):
+    pair = small_motions.pair("adult", "pepper")
+    for name, method in METHODS.items():
+        if not method.seeded and name != "mink":  # an extra, and the procrustes rotation of `geometric`
+            first, second = (fit(pair, name, seed=seed, confidence=False)(pair.source[:5]) for seed in (0, 7))
+            assert np.array_equal(first, second), name
+
+
 def test_a_schedule_keeps_batches_together_and_hands_out_everything_once(small_motions):
-    cells = cells_of(BenchmarkConfig.of({**QUICK, "seeds": 3}), small_motions)
+    cells = cells_of(BenchmarkConfig.of({**QUICK, "methods": ["syda", "direct"], "seeds": 3}), small_motions)
     schedule = Schedule(cells, 2)
     taken, last = [], [None, None]
     while True:
@@ -210,6 +239,57 @@ def test_a_lost_cell_is_computed_again_to_the_same_bytes(computed, small_motions
     assert in_process[0].computed == 2
     assert (folder / "results.csv").read_bytes() == before
     assert not list((folder / "cells").glob(".*"))
+
+
+RUN = """
+import sys
+from syda_gym.evaluation.benchmark import BenchmarkConfig, run_benchmark
+if __name__ == "__main__":
+    run_benchmark(BenchmarkConfig.read(sys.argv[1]), sys.argv[2], workers=2)
+"""
+
+
+def test_a_killed_run_goes_on_to_the_same_bytes_and_leaves_no_process_behind(tmp_path, in_process):
+    """The cheap version of ``scripts/check_benchmark.py kills``."""
+    settings = {
+        "routes": ["adult>pepper", "adult>kid"],
+        "methods": ["ridge", "geometric"],
+        "folds": 2,
+        "fps": 3,
+        "physics": "servo",
+        "fit": {"ridge": {"confidence": False}, "geometric": {"confidence": False}},
+    }
+    (tmp_path / "config.yaml").write_text(json.dumps(settings))
+    folder = tmp_path / "killed"
+    process = subprocess.Popen([sys.executable, "-c", RUN, str(tmp_path / "config.yaml"), str(folder)])
+    deadline = time.monotonic() + 300.0  # a busy machine imports slowly
+    while not list(folder.glob("cells/[0-9a-f]*.json")) and process.poll() is None:
+        assert time.monotonic() < deadline, "no cell was finished"
+        time.sleep(0.01)
+    workers = children_of(process.pid)
+    process.kill()
+    process.wait()
+    while any(map(is_running, workers)):
+        assert time.monotonic() < deadline, "the killed run left processes behind"
+        time.sleep(0.05)
+    run_benchmark(BenchmarkConfig.of(settings), folder)
+    assert sum(pool.computed for pool in in_process) < 4  # the first cell was not computed again
+    run_benchmark(BenchmarkConfig.of(settings), tmp_path / "whole")
+    for name in ("results.csv", "benchmark.json"):
+        assert (folder / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def children_of(process):
+    text = subprocess.run(["ps", "-o", "pid=", "--ppid", str(process)], capture_output=True, text=True).stdout
+    return [int(line) for line in text.split()]
+
+
+def is_running(process):
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 def test_two_processes_give_the_same_bytes_as_one(computed, small_motions, tmp_path):

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from syda_gym.evaluation.benchmark.config import BenchmarkConfig
+from syda_gym.evaluation.benchmark.config import BenchmarkConfig, split_method
 from syda_gym.evaluation.chains import Route, name_of
 from syda_gym.files import fingerprint
 from syda_gym.motions.clip import Motions
@@ -77,7 +77,7 @@ def cells_of(config: BenchmarkConfig, motions: Motions) -> list[Cell]:
     """Every cell of a benchmark, ordered by batch.
 
     Chains that end in a human have no episodes; they are scored by the mapping alone, with the agent ``base`` and no
-    disturbance.
+    disturbance. Where nothing depends on the seed, only the first one is computed: the others would be copies.
     """
     data = data_fingerprint(motions)
     settings = _settings(config)
@@ -88,7 +88,8 @@ def cells_of(config: BenchmarkConfig, motions: Motions) -> list[Cell]:
                 played = motions.bodies[route[-1]].kind == "robot"
                 for agent in config.agents if played else ("base",):
                     for disturbance in config.disturbances if played else ("none",):
-                        cells.append(Cell("episodes", route, method, agent, disturbance, seed, settings, data))
+                        if seed == config.seeds[0] or _random(method, agent, disturbance):
+                            cells.append(Cell("episodes", route, method, agent, disturbance, seed, settings, data))
     unique = list(dict.fromkeys(cells))
     return [*unique, *efficiency_cells(config, data)]
 
@@ -100,9 +101,10 @@ def efficiency_cells(config: BenchmarkConfig, data: str) -> list[Cell]:
         return []
     direct = (plan.chain[0], plan.chain[-1])
     settings = json.dumps({"folds": config.folds, "fps": config.fps, "fit": _fit_options(config, plan.method)})
+    seeds = config.seeds if _random(plan.method, "base", "none") else config.seeds[:1]
     return [
         Cell("efficiency", route, plan.method, "base", "none", seed, settings, data, count, plan.new_body, draw)
-        for seed in config.seeds
+        for seed in seeds
         for draw in range(plan.draws)
         for count in plan.actions
         for route in (plan.chain, direct)
@@ -119,6 +121,14 @@ def data_fingerprint(motions: Motions) -> str:
         for name in sorted(take.frames):
             parts += [name, take.frames[name].tobytes()]
     return fingerprint(*parts)
+
+
+def _random(method: str, agent: str, disturbance: str) -> bool:
+    """Whether the numbers of a cell depend on its seed."""
+    from syda_gym.agents.classical import RIVALS
+    from syda_gym.mappings.fitting import METHODS
+
+    return METHODS[split_method(method)[0]].seeded or agent not in RIVALS or disturbance != "none"
 
 
 def _settings(config: BenchmarkConfig) -> str:

@@ -148,7 +148,7 @@ class ProcessPool(Pool):
 
         # Spawned, not forked: PyBullet clients and torch threads do not survive a fork.
         context = multiprocessing.get_context("spawn")
-        return ProcessPoolExecutor(1, mp_context=context, initializer=_open, initargs=(self._motions,))
+        return ProcessPoolExecutor(1, mp_context=context, initializer=_open_process, initargs=(self._motions,))
 
 
 class RayPool(Pool):
@@ -214,6 +214,23 @@ class _Actor:
 
 
 _worker: Any = None  # the worker of this process, opened once by the pool
+
+
+def _open_process(motions: Motions) -> None:
+    """Opens the worker of a process that ends when its parent is gone: a killed run leaves nobody behind."""
+    import multiprocessing
+    from multiprocessing.connection import wait
+    from threading import Thread
+
+    parent = multiprocessing.parent_process()
+
+    def follow() -> None:
+        if parent is not None:
+            wait([parent.sentinel])
+            os._exit(1)
+
+    Thread(target=follow, name="follow-parent", daemon=True).start()
+    _open(motions)
 
 
 def _open(motions: Motions) -> None:
