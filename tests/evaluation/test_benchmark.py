@@ -263,12 +263,14 @@ def test_a_killed_run_goes_on_to_the_same_bytes_and_leaves_no_process_behind(tmp
     folder = tmp_path / "killed"
     process = subprocess.Popen([sys.executable, "-c", RUN, str(tmp_path / "config.yaml"), str(folder)])
     deadline = time.monotonic() + 300.0  # a busy machine imports slowly
-    while not list(folder.glob("cells/[0-9a-f]*.json")) and process.poll() is None:
-        assert time.monotonic() < deadline, "no cell was finished"
-        time.sleep(0.01)
-    workers = children_of(process.pid)
-    process.kill()
-    process.wait()
+    try:
+        while not list(folder.glob("cells/[0-9a-f]*.json")) and process.poll() is None:
+            assert time.monotonic() < deadline, "no cell was finished"
+            time.sleep(0.01)
+        workers = children_of(process.pid)
+    finally:
+        process.kill()
+        process.wait()
     while any(map(is_running, workers)):
         assert time.monotonic() < deadline, "the killed run left processes behind"
         time.sleep(0.05)

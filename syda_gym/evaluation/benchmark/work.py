@@ -18,6 +18,7 @@ from syda_gym.evaluation.benchmark.cells import Cell
 from syda_gym.evaluation.benchmark.config import split_method
 from syda_gym.evaluation.chains import Links, action_groups
 from syda_gym.evaluation.episodes import FIGURES, Recording, figures_of_all, latency, make_env, play_all
+from syda_gym.evaluation.remembering import Remembering
 from syda_gym.motions.clip import Motions, PairedMotions
 
 if TYPE_CHECKING:
@@ -108,12 +109,13 @@ class Worker:
             "control_hz": settings["control_hz"],
             "success_error": settings["success_error"],
         }
-        env = make_env(mapping, self._motions, group, **options)
+        remembering = Remembering(mapping)
+        env = make_env(remembering, self._motions, group, **options)
         try:
             agent = self._agent(cell, settings, mapping, group, env)
             capsules = None if bullet else CapsuleModel(env.robot)
             recordings = list(play_all(env, agent, cell.seed))
-            figures = figures_of_all(recordings, env.robot, mapping, capsules)
+            figures = figures_of_all(recordings, env.robot, remembering, capsules)
             if not shown:
                 shown.append(_shown(recordings[0], mapping, figures[0].bound))
             if fold == 0:
