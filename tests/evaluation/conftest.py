@@ -52,13 +52,17 @@ def small_motions(embedded: Motions) -> Motions:
     return Motions("small", takes, {b: slow.bodies[b] for b in bodies}, slow.families, synthetic=True)
 
 
-def sample_playback(motions: Motions, chains: int = 2, frames: int = 40) -> Playback:
+def sample_playback(motions: Motions, chains: int = 2, frames: int = 40, own_tracks: bool = False) -> Playback:
+    """Chains of adult, kid and Pepper; with ``own_tracks`` every chain has another operator motion."""
     take = motions.takes[5]
     shown = {name: track(motions.bodies[name], take.frames[name][:frames]) for name in ("adult", "kid", "pepper")}
     entries = []
     for index in range(chains):
         off = motions.bodies["pepper"].check(take.frames["pepper"][:frames]) + 0.002 * index + 0.1
         route = ["adult", "kid"][: 1 + index % 2]
+        if own_tracks:
+            moved = 0.001 * index
+            shown |= {n: track(motions.bodies[n], take.frames[n][:frames] * (1.0 + moved)) for n in ("adult", "kid")}
         robot = track(motions.bodies["pepper"], off)
         entries.append(
             PlaybackChain(
