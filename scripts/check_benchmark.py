@@ -156,8 +156,8 @@ def overhead(motions_name: str) -> dict[str, Any]:
 
 
 def _few(motions: Motions, actions: int) -> Motions:
-    """The first actions that operator and robot have in common."""
-    names = motions.pair("adult", "pepper").action_names[:actions]
+    """The first actions of every recorded pair."""
+    names = {name for pair in motions.pairs for name in motions.pair(*pair).action_names[:actions]}
     return replace(motions, takes=tuple(take for take in motions.takes if take.action in names))
 
 
