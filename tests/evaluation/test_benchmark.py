@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -117,6 +118,12 @@ def test_a_configuration_survives_writing_and_reading(tmp_path):
     file.write_text(yaml.safe_dump(config.as_dict()))
     assert BenchmarkConfig.read(file) == config
     assert config.seeds == (0, 1, 2)
+
+
+def test_the_paper_benchmark_of_the_examples_is_read():
+    file = Path(__file__).resolve().parents[2] / "examples" / "paper_benchmark.yaml"
+    config = BenchmarkConfig.read(file)
+    assert (len(config.routes), len(config.methods), len(config.seeds), config.folds) == (8, 4, 10, "loao")
 
 
 def test_routes_follow_the_recorded_pairs(small_motions):
