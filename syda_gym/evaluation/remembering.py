@@ -40,11 +40,11 @@ class Remembering(Mapping):
     @property
     def window(self) -> int:
         """Of the mapping itself."""
-        return self.mapping.window
+        return int(getattr(self.mapping, "window", 0))
 
     def raw(self, frames: FloatArray) -> FloatArray:
         """Maps the frames that are new and looks the others up."""
-        if self.mapping.window:  # an output depends on more than its own frame
+        if self.window:  # an output depends on more than its own frame
             return self.mapping.raw(frames)
         keys = [row.tobytes() for row in np.ascontiguousarray(frames, dtype=np.float32)]
         new: dict[bytes, int] = {}
