@@ -1,6 +1,6 @@
 """Compare our interquartile means and intervals with rliable's on a fixture; development only.
 
-    pip install --no-deps rliable 'arch<8' absl-py && pip install pandas statsmodels seaborn
+    pip install --no-deps rliable 'arch<8' absl-py && pip install 'pandas<3' statsmodels seaborn
     python scripts/check_statistics.py
 
 rliable pins nothing that we need, so it is no dependency; the figures that this prints are written down in
