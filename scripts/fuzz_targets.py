@@ -16,7 +16,7 @@ from syda_gym.agents.bundle import load_agent, save_agent
 from syda_gym.agents.checkpoint import load_checkpoint
 from syda_gym.agents.classical import make_rival
 from syda_gym.agents.interface import Interface
-from syda_gym.agents.predictor import Predictor
+from syda_gym.agents.predictor import Predictor, input_count
 from syda_gym.agents.tcn import TcnShape
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.robot import Robot
@@ -169,7 +169,7 @@ def agent_targets(folder: Path) -> list[Target]:
     layout = {name: slice(end - size, end) for (name, size), end in zip(parts.items(), ends, strict=True)}
     interface = Interface(robot, layout, ends[-1], 1 / 30, 0.5)
     rng = np.random.default_rng(0)
-    shapes = TcnShape(3 * n + 1, 4, n).shapes()
+    shapes = TcnShape(input_count(interface), 4, n).shapes()
     stored = {name: rng.normal(0, 0.1, size).astype(np.float32) for name, size in shapes.items()}
     agent = Predictor(interface, make_rival("kalman", interface), weights=stored, channels=4)
     card = save_agent(agent, folder / "agent")
