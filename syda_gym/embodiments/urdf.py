@@ -128,8 +128,10 @@ def arm_chain(
         points: links whose origins are shoulder, elbow, wrist and tip.
 
     Raises:
-        EmbodimentError: unknown names, joints out of order or not revolute.
+        EmbodimentError: no joint, unknown names, joints out of order or not revolute.
     """
+    if not joints:
+        raise EmbodimentError(f"{tree.path.name}: the {side} arm has no joint; name its revolute joints, torso outward")
     for link in (torso, *points):
         if link not in tree.links():
             raise EmbodimentError(f"{tree.path.name} has no link {link!r}; {nearest_name(link, tree.links())}")

@@ -143,6 +143,8 @@ def test_bad_arms_are_named(tmp_path):
     reordered = [{**arms[0], "joints": arms[0]["joints"][::-1]}, arms[1]]
     with pytest.raises(EmbodimentError, match="does not come after"):
         Robot.read(_description(tmp_path, arms=reordered))
+    with pytest.raises(EmbodimentError, match="left arm has no joint"):
+        Robot.read(_description(tmp_path, arms=[{**arms[0], "joints": []}, arms[1]]))
     with pytest.raises(EmbodimentError, match="must have a length"):
         Robot.read(_description(tmp_path, arms=[{**arms[0], "elbow": arms[0]["shoulder"]}, arms[1]]))
     with pytest.raises(EmbodimentError, match=r"one left and/or one right arm, got sides \['left', 'righ'\]"):
