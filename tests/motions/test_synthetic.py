@@ -84,7 +84,8 @@ def test_the_asset_is_what_the_code_generates(embedded: Motions) -> None:
     for take in fresh.takes:
         for body, frames in take.frames.items():
             step = 1e-3 if embedded.bodies[body].kind == "human" else 1e-4
-            np.testing.assert_array_equal(np.round(frames / step) * step, stored[take.recording].frames[body])
+            # Half a step is the rounding, the rest what the search of the inverse kinematics leaves open (1e-6 rad).
+            np.testing.assert_allclose(frames, stored[take.recording].frames[body], rtol=0, atol=0.55 * step)
             assert np.array_equal(
                 take.filled.get(body, np.zeros(1, bool)), stored[take.recording].filled.get(body, np.zeros(1, bool))
             )
