@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
 import numpy as np
 import pytest
 import torch
@@ -10,7 +14,7 @@ from syda_gym.agents.agent import BaseAlone
 from syda_gym.agents.avoidance import avoiding
 from syda_gym.agents.classical import make_rival
 from syda_gym.agents.contact_term import ContactTerm
-from syda_gym.agents.figures import jitter
+from syda_gym.agents.figures import Figures, jitter
 from syda_gym.agents.predictor_training import PredictorConfig, train_predictor
 from syda_gym.agents.projection import Projection, capsule_model
 from syda_gym.agents.streams import Streams, score_streams
@@ -111,3 +115,34 @@ def test_a_predictor_on_the_projection_starts_as_it_and_is_judged_by_contacts_to
     assert trained.agent.stack == ("base", "projection", "predictor", "lead")
     with pytest.raises(AgentError, match="contact_margin"):
         PredictorConfig(contact_weight=1.0, contact_margin=1.0)
+
+
+@pytest.fixture(scope="module")
+def study() -> ModuleType:
+    path = Path(__file__).parents[2] / "scripts" / "study_contacts.py"
+    spec = importlib.util.spec_from_file_location("study_contacts", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_study_chooses_the_least_j_among_settings_with_few_contacts(study):
+    base = Figures(9.0, 10.0, 1.0, 0.1)
+    settings = {
+        "touches": Figures(1.0, 10.0, 1.0, 0.02),
+        "clear": Figures(2.0, 10.0, 1.0, 0.015),
+        "clearest": Figures(3.0, 10.0, 1.0, 0.0),
+    }
+    assert study.choose(base, settings) == "clear"
+    assert study.choose(Figures(9.0, 10.0, 1.0, 0.01), settings) == "clearest"
+    del settings["clear"], settings["clearest"]
+    assert study.choose(base, settings) == "touches"
+
+
+def test_the_study_judges_by_bullet_with_self_collision(study):
+    judged = study.in_bullet(study.VALIDATION, 102)
+    assert judged.physics == "bullet"
+    assert judged.self_collision
+    assert not {*study.TRAIN, *study.VALIDATION} & set(study.TEST)
