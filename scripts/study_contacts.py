@@ -134,10 +134,10 @@ def _train(path: Path, margin: float, penalty: int, seed: int) -> None:
     grounds = (Ground(options(TRAIN, 101, 1)), Ground(options(VALIDATION, 102, 1)))
     rng = np.random.default_rng(seed)
     streams = [ground.record(seed=seed) for ground in grounds]
-    streams = [join([s, with_detours(s, g, rng)]) for s, g in zip(streams, grounds, strict=True)]
+    taught, held = (join([s, with_detours(s, g, rng)]) for s, g in zip(streams, grounds, strict=True))
     interface, began = grounds[0].interface, time.process_time()
     base = Projection(interface, BaseAlone(interface), margin=margin)
-    trained = train_predictor(base, *streams, grounds[0].rates, config, seed=seed)
+    trained = train_predictor(base, taught, held, grounds[0].rates, config, seed=seed)
     seconds = round(time.process_time() - began, 1)
     curve = [figures.as_dict() for figures in trained.history]
     save_agent(
