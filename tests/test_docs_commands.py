@@ -26,7 +26,7 @@ PARSED = {
     "syda-gym demo": "minutes; `make demo` in CI",
     "syda-gym train": "minutes; tests/agents/test_work.py",
     "syda-gym benchmark study.yaml": "minutes to hours; tests/evaluation/test_benchmark.py",
-    "syda-gym benchmark examples/paper_benchmark.yaml": "needs the paper's recordings; tests/evaluation/test_benchmark.py",
+    "syda-gym benchmark examples/paper_benchmark.yaml": "needs the paper's recordings; tests/evaluation",
     "syda-gym compare study other": "needs two benchmarks; tests/evaluation/test_benchmark.py",
     "syda-gym suggest adult kid pepper --pair kid:pepper --benchmark": "needs a benchmark; tests/evaluation",
     "syda-gym export-episodes": "needs the extra data; tests/evaluation/test_minari_export.py",
