@@ -46,11 +46,13 @@ def rich_table(table: Table, width: int, *, most_rows: int = 60) -> Any:
     titles = [f"{column.title} [{column.unit}]" if column.unit else column.title for column in table.columns]
     widths = [_width(title, [row[i] for row in words]) for i, title in enumerate(titles)]
     count = _fitting(widths, width)
+    # Left to itself, rich shares out a narrow terminal by the length of the headings and cuts the last cells.
+    narrow = _fitting([max(len(title), one) for title, one in zip(titles, widths, strict=True)], width) < count
     shown = RichTable(title=Text(table.title, style="bold"), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     for index, title in enumerate(titles[:count]):
         numeric = any(not isinstance(row[index], str | bool | None) for row in table.rows)
         side: Any = "right" if numeric else "left"
-        shown.add_column(Text(title), justify=side, vertical="bottom", min_width=widths[index])
+        shown.add_column(Text(title), justify=side, vertical="bottom", width=widths[index] if narrow else None)
     for index, row in enumerate(words):
         shown.add_row(*(_stiff(cell) for cell in row[:count]), style="bold" if index in table.strong else None)
     return Group(shown, *_below(table, titles[count:], len(rows)))
