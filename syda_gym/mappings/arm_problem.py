@@ -10,6 +10,7 @@ import numpy as np
 from syda_gym.embodiments import landmark_error
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import MappingError
+from syda_gym.files import fingerprint
 from syda_gym.mappings.arm_coders import HumanArmCoder, RobotArmCoder, arm_coder, shared_arms
 from syda_gym.mappings.card import card_of
 from syda_gym.mappings.coded import CodedMapping
@@ -104,10 +105,6 @@ class ArmProblem:
         step = -(-len(x) * x.shape[1] // _MAX_ROWS)
         return x[::step].reshape(-1, x.shape[-1]), y[::step].reshape(-1, y.shape[-1])
 
-    def without(self, actions: Sequence[str], coding: Coding) -> ArmProblem:
-        """The same problem with some actions held out, calibrated anew."""
-        return ArmProblem.build(self.pair.without_actions(actions), self.seed, coding)
-
 
 def main_width(coder: ArmCoder) -> int:
     """Width of a code without the extra joints of a robot."""
@@ -134,25 +131,50 @@ def fit_problems(
     Returns:
         One mapping per job.
     """
-    built: dict[int, ArmProblem] = {}
-    for job in jobs:
-        if id(job.pair) not in built:
-            built[id(job.pair)] = ArmProblem.build(job.pair, job.seed, coding)
-    problems = [replace(built[id(job.pair)], seed=job.seed) for job in jobs]
+    # Fold a without action b is fold b without action a: the same frames, built and fitted once.
+    problems = _built([(job.pair, job.seed) for job in jobs], coding)
     groups = [action_groups(problem.pair) if confidence else [] for problem in problems]
-    held_out = [problem.without(g, coding) for problem, gs in zip(problems, groups, strict=True) for g in gs]
-    fitted = iter(fitter([*problems, *held_out]))
-    mains = [assemble(problem, next(fitted)) for problem in problems]
-    trials = iter([assemble(problem, next(fitted)) for problem in held_out])
+    trained = [
+        (problem.pair.without_actions(actions), problem.seed)
+        for problem, several in zip(problems, groups, strict=True)
+        for actions in several
+    ]
+    held_out = _built(trained, coding, problems)
+    distinct = {id(problem): problem for problem in (*problems, *held_out)}
+    regressors = dict(zip(distinct, fitter(list(distinct.values())), strict=True))
+    parts = {key: assemble(problem, regressors[key]) for key, problem in distinct.items()}
+    trials = iter(parts[id(problem)] for problem in held_out)
     result = []
-    for job, problem, parts, group in zip(jobs, problems, mains, groups, strict=True):
+    for job, problem, group in zip(jobs, problems, groups, strict=True):
         card = card_of(job.pair, method, job.preset, job.seed, job.options)
-        mapping = CodedMapping(card, *parts)
+        mapping = CodedMapping(card, *parts[id(problem)])
         if confidence:
             tests = [(job.pair.only_actions(actions), CodedMapping(card, *next(trials))) for actions in group]
             mapping.confidence, mapping.confidence_back = _confidences(mapping, problem, tests)
         result.append(mapping)
     return result
+
+
+def _built(
+    wanted: Sequence[tuple[PairedMotions, int]], coding: Coding, known: Sequence[ArmProblem] = ()
+) -> list[ArmProblem]:
+    """Problems for pairs and seeds; equal frames are built once, and with equal seeds they are one problem."""
+    by_frames = {_identity(problem.pair): problem for problem in known}
+    distinct = {(_identity(problem.pair), problem.seed): problem for problem in known}
+    result = []
+    for pair, seed in wanted:
+        frames = _identity(pair)
+        if frames not in by_frames:
+            by_frames[frames] = ArmProblem.build(pair, seed, coding)
+        if (frames, seed) not in distinct:
+            distinct[frames, seed] = replace(by_frames[frames], seed=seed)
+        result.append(distinct[frames, seed])
+    return result
+
+
+def _identity(pair: PairedMotions) -> str:
+    """A text that two pairs share if a fit cannot tell them apart."""
+    return fingerprint(pair.fingerprint, "|".join(pair.recordings.tolist()), pair.mirrored.tobytes())
 
 
 def assemble(problem: ArmProblem, regressor: Regressor) -> tuple[ArmCoder, ArmCoder, Regressor]:
