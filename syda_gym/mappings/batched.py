@@ -159,8 +159,8 @@ class BatchedNetwork:
         last = len(layers) - (0 if self._activated(name) else 1)
         for index in range(len(layers) - 1, -1, -1):
             if index < last and self.settings.slope != 1.0:
-                # The sign of a leaky ReLU's output is the sign of its input.
-                slope = torch.where(path[index + 1] > 0.0, slope, slope * self.settings.slope)
+                # The sign of a leaky ReLU's output is the sign of its input, so the output serves.
+                slope = torch.ops.aten.leaky_relu_backward(slope, path[index + 1], self.settings.slope, True)
             to_weight, to_bias = self.gradients[name][index]
             to_weight.copy_(torch.bmm(path[index].transpose(1, 2), slope))
             torch.sum(slope, dim=1, keepdim=True, out=to_bias)
