@@ -51,6 +51,7 @@ KILLED = {
     "physics": "servo",
     "fit": {name: {"confidence": False} for name in ("ridge", "nearest", "geometric")},
 }
+KILLED_ACTIONS = 6
 KILLS = 20
 
 
@@ -202,18 +203,16 @@ def kills(count: int, seed: int) -> dict[str, Any]:
 
 def _start(config: Path, folder: Path, workers: int) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [sys.executable, "-c", _RUN, str(config), str(folder), str(workers)],
+        [sys.executable, __file__, "run", str(config), str(folder), str(workers)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
 
 
-_RUN = """
-import sys
-from syda_gym.evaluation.benchmark import BenchmarkConfig, run_benchmark
-if __name__ == "__main__":
-    run_benchmark(BenchmarkConfig.read(sys.argv[1]), sys.argv[2], workers=int(sys.argv[3]))
-"""
+def run(config: Path, folder: Path, workers: int) -> None:
+    """The run that is killed: a few actions, so that a death costs seconds."""
+    motions = _few(load_motions("embedded", KILLED["fps"]), KILLED_ACTIONS)
+    run_benchmark(BenchmarkConfig.read(config), folder, workers=workers, motions=motions)
 
 
 def _finish(config: Path, folder: Path, workers: int) -> None:
@@ -325,7 +324,14 @@ def main() -> None:
     two.add_argument("--seed", type=int, default=0)
     three = commands.add_parser("summary")
     three.add_argument("folder", type=Path)
+    four = commands.add_parser("run", help="the run that `kills` kills")
+    four.add_argument("config", type=Path)
+    four.add_argument("folder", type=Path)
+    four.add_argument("workers", type=int)
     given = parser.parse_args()
+    if given.command == "run":
+        run(given.config, given.folder, given.workers)
+        return
     checks: dict[str, Callable[[], dict[str, Any]]] = {
         "overhead": lambda: overhead(given.motions),
         "kills": lambda: kills(given.count, given.seed),

@@ -40,7 +40,8 @@ def export_minari(
     """Plays episodes and stores observations, actions and rewards.
 
     The environment is described by plain options, so that ``minari.load_dataset(name).recover_environment()`` makes it
-    again. Actions are corrections of the base command in [-1, 1]; for the agent ``base`` they are zero.
+    again. Actions are corrections of the base command in [-1, 1]; for the agent ``base`` they are zero but for
+    the rounding of the observation that it reads its command from.
 
     Args:
         name: such as ``syda/adult-pepper-v0``; Minari wants a version at the end.

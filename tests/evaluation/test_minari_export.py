@@ -23,7 +23,7 @@ def test_episodes_are_stored_and_their_environment_is_made_again(tmp_path, monke
     assert (stored.total_episodes, stored.total_steps) == (exported.episodes, exported.steps)
     for episode in stored.iterate_episodes():
         assert len(episode.observations) == len(episode.actions) + 1
-        assert not episode.actions.any(), "the base alone corrects nothing"
+        assert np.abs(episode.actions).max() < 1e-5, "the base alone corrects nothing but its own rounding"
         assert np.isfinite(episode.rewards).all()
     env = stored.recover_environment()
     assert env.unwrapped.options.physics == "servo"

@@ -24,6 +24,7 @@ from syda_gym.motions.clip import Motions, PairedMotions
 if TYPE_CHECKING:
     from syda_gym.agents.agent import Agent
     from syda_gym.mappings.mapping import Mapping
+    from syda_gym.simulation.capsules import CapsuleModel
 
 __all__ = ["COLUMNS", "Worker", "folds_of"]
 
@@ -54,6 +55,7 @@ class Worker:
     def __init__(self, motions: Motions) -> None:
         self._motions = motions
         self._links: OrderedDict[tuple[Any, ...], Links] = OrderedDict()
+        self._capsules: dict[str, CapsuleModel] = {}
         _single_thread()
 
     def run(self, cell: Cell) -> dict[str, Any]:
@@ -99,8 +101,6 @@ class Worker:
         timing: dict[str, float],
         shown: list[dict[str, Any]],
     ) -> list[dict[str, Any]]:
-        from syda_gym.simulation.capsules import CapsuleModel
-
         bullet = settings["physics"] == "bullet" and settings["self_collision"]
         options = {
             "disturbances": None if cell.disturbance == "none" else cell.disturbance,
@@ -113,7 +113,7 @@ class Worker:
         env = make_env(remembering, self._motions, group, **options)
         try:
             agent = self._agent(cell, settings, mapping, group, env)
-            capsules = None if bullet else CapsuleModel(env.robot)
+            capsules = None if bullet else self._capsules_of(env.robot)
             recordings = list(play_all(env, agent, cell.seed))
             figures = figures_of_all(recordings, env.robot, remembering, capsules)
             if not shown:
@@ -125,6 +125,13 @@ class Worker:
             return [_row(cell, fold, one.to_dict()) for one in figures]
         finally:
             env.close()
+
+    def _capsules_of(self, robot: Robot) -> CapsuleModel:
+        from syda_gym.simulation.capsules import CapsuleModel
+
+        if robot.name not in self._capsules:
+            self._capsules[robot.name] = CapsuleModel(robot)
+        return self._capsules[robot.name]
 
     def _agent(self, cell: Cell, settings: dict[str, Any], mapping: Mapping, group: Sequence[str], env: Any) -> Agent:
         from syda_gym.agents.bundle import load_agent
