@@ -2,7 +2,8 @@
 
 Run it from anywhere: ``python scripts/benchmark_environment.py [--out FILE.json] [--quick]``. Times are CPU times of
 the measuring thread, so that other work on the machine disturbs them less; every figure is a median. The raw cost of
-physics is that of the bare ``stepSimulation`` calls while the robots make the very same motion.
+physics is that of the bare ``stepSimulation`` (or ``mj_step``) calls inside the very steps that it is compared with,
+because a machine's speed changes from one moment to the next.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import sys
 import time
 from collections.abc import Callable
 from typing import Any
+from unittest import mock
 
 import gymnasium
 import numpy as np
@@ -41,6 +43,47 @@ def cpu(function: Callable[[], object]) -> float:
     start = time.thread_time()
     function()
     return time.thread_time() - start
+
+
+class Stopwatch:
+    """Calls a function and adds up the seconds that it takes."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self._spent = 0.0
+
+    def __call__(self, *args: Any, **options: Any) -> Any:
+        """The function itself."""
+        start = time.perf_counter()
+        result = self._function(*args, **options)
+        self._spent += time.perf_counter() - start
+        return result
+
+    def take(self) -> float:
+        """Seconds since the last look."""
+        spent, self._spent = self._spent, 0.0
+        return spent
+
+
+def timed_steps(step: Callable[[], object], watch: Stopwatch, steps: int) -> tuple[list[float], list[float]]:
+    """Seconds of physics and of everything, step by step."""
+    raw, whole = [], []
+    for _ in range(steps):
+        watch.take()
+        start = time.perf_counter()
+        step()
+        whole.append(time.perf_counter() - start)
+        raw.append(watch.take())
+    return raw, whole
+
+
+def shares_of(raws: list[float], wholes: list[float]) -> dict[str, float]:
+    """The medians that are reported."""
+    return {
+        "share_of_raw": statistics.median(raw / whole for raw, whole in zip(raws, wholes, strict=True)),
+        "raw_us": 1e6 * statistics.median(raws),
+        "step_us": 1e6 * statistics.median(wholes),
+    }
 
 
 def commands_of(env: Any, steps: int) -> list[np.ndarray]:
@@ -76,24 +119,16 @@ def against_raw(count: int, physics_hz: float, repeats: int) -> dict[str, float]
         action = np.zeros((count, 10), dtype=np.float32)
     env.reset(seed=0)
     env.step(action)
-
-    shares, raws, wholes = [], [], []
+    world = env.unwrapped._fleet.world
+    watch = world._simulate = Stopwatch(world._simulate)
+    raws, wholes = [], []
     for repeat in range(repeats):
         env.reset(seed=repeat)
-        commands = commands_of(env, STEPS)
-        whole = [cpu(lambda: env.step(action)) for _ in range(STEPS)]
-        env.reset(seed=repeat)
-        raw = raw_steps(env, commands)
-        shares.append(statistics.median(raw) / statistics.median(whole))
+        raw, whole = timed_steps(lambda: env.step(action), watch, STEPS)
         raws += raw
         wholes += whole
     env.close()
-    return {
-        "share_of_raw": statistics.median(shares),
-        "best_share_of_raw": max(shares),
-        "raw_us": 1e6 * statistics.median(raws),
-        "step_us": 1e6 * statistics.median(wholes),
-    }
+    return shares_of(raws, wholes)
 
 
 def servo_vector(count: int, repeats: int) -> dict[str, float]:
@@ -200,50 +235,37 @@ def humanoid() -> dict[str, float] | str:
     except Exception as error:  # not installed, or versions that do not fit each other: a peer may be left out
         return f"{type(error).__name__}: {error}".splitlines()[0]
     action = np.zeros(env.action_space.shape, dtype=np.float32)
-    inner, shares, wholes, resets = env.unwrapped, [], [], []
-    for repeat in range(15):
-        resets.append(cpu(lambda repeat=repeat: env.reset(seed=repeat)))  # type: ignore[misc]
-        whole = [cpu(lambda: env.step(action)) for _ in range(20)]
-        env.reset(seed=repeat)
-        raw = []
-        for _ in range(20):
-            inner.data.ctrl[:] = action
-            raw.append(cpu(lambda: mujoco.mj_step(inner.model, inner.data, nstep=inner.frame_skip)))
-        shares.append(statistics.median(raw) / statistics.median(whole))
-        wholes += whole
+    resets, raws, wholes = [], [], []
+    with mock.patch.object(mujoco, "mj_step", Stopwatch(mujoco.mj_step)) as watch:
+        for repeat in range(15):
+            resets.append(cpu(lambda repeat=repeat: env.reset(seed=repeat)))  # type: ignore[misc]
+            raw, whole = timed_steps(lambda: env.step(action), watch, 20)
+            raws += raw
+            wholes += whole
     env.close()
-    return {
-        "share_of_raw": statistics.median(shares),
-        "step_us": 1e6 * statistics.median(wholes),
-        "reset_ms": 1e3 * statistics.median(resets),
-    }
+    return {**shares_of(raws, wholes), "reset_ms": 1e3 * statistics.median(resets)}
 
 
 def panda() -> dict[str, float] | str:
     """panda-gym's PandaReach-v3 against its own bare ``stepSimulation`` calls; why not, where it cannot be made."""
     try:
         import panda_gym  # noqa: F401
-        import pybullet
 
         env: Any = gymnasium.make("PandaReach-v3")
     except Exception as error:  # not installed, or versions that do not fit each other: a peer may be left out
         return f"{type(error).__name__}: {error}".splitlines()[0]
     env.reset(seed=0)
     action = np.zeros(env.action_space.shape, dtype=np.float32)
-    simulation, shares, wholes, resets = env.unwrapped.sim, [], [], []
-    client, substeps = simulation.physics_client._client, range(simulation.n_substeps)
+    simulation = env.unwrapped.sim
+    watch = simulation.step = Stopwatch(simulation.step)
+    resets, raws, wholes = [], [], []
     for _ in range(15):
         resets.append(cpu(env.reset))
-        whole = [cpu(lambda: env.step(action)) for _ in range(20)]
-        raw = [cpu(lambda: [pybullet.stepSimulation(client) for _ in substeps]) for _ in range(20)]
-        shares.append(statistics.median(raw) / statistics.median(whole))
+        raw, whole = timed_steps(lambda: env.step(action), watch, 20)
+        raws += raw
         wholes += whole
     env.close()
-    return {
-        "share_of_raw": statistics.median(shares),
-        "step_us": 1e6 * statistics.median(wholes),
-        "reset_ms": 1e3 * statistics.median(resets),
-    }
+    return {**shares_of(raws, wholes), "reset_ms": 1e3 * statistics.median(resets)}
 
 
 def measure(quick: bool) -> dict[str, Any]:

@@ -127,10 +127,7 @@ class World:
         """Lets every robot follow its command ``(B, n)`` [rad] for one control step."""
         for puppet, command in zip(self._puppets, commands.tolist(), strict=True):
             puppet.command(command)
-        step, substeps = self._bullet.stepSimulation, range(self.rates.substeps)
-        for client in self._clients:
-            for _ in substeps:
-                step(client)
+        self._simulate()
         self._take(np.array([puppet.read() for puppet in self._puppets]))
         if self.self_collision:
             self.contacts = np.array([puppet.contacts() for puppet in self._puppets], dtype=np.int64)
@@ -143,9 +140,7 @@ class World:
         """
         puppet = self._puppets[0]
         puppet.command(command)
-        step, client = self._bullet.stepSimulation, self._clients[0]
-        for _ in range(self.rates.substeps):
-            step(client)
+        self._simulate()
         return self._read_one(puppet)
 
     def reset_one(self, q: list[float]) -> list[float]:
@@ -157,6 +152,13 @@ class World:
         puppet = self._puppets[0]
         puppet.reset(q)
         return self._read_one(puppet)
+
+    def _simulate(self) -> None:
+        """The bare physics of one control step."""
+        step, substeps = self._bullet.stepSimulation, range(self.rates.substeps)
+        for client in self._clients:
+            for _ in substeps:
+                step(client)
 
     def _read_one(self, puppet: _Puppet) -> list[float]:
         row = puppet.read()
