@@ -20,7 +20,7 @@ test: $(DEVELOPMENT)
 coverage: $(DEVELOPMENT)
 	$(BIN)/python -m pytest -n 2 --dist loadfile --cov --cov-report=term-missing:skip-covered --cov-report=html:coverage
 
-# The tests of the lower floors with the lowest versions that pyproject.toml allows.
+# The tests of most rooms with the lowest versions that pyproject.toml allows.
 LOWEST := .venv/lowest
 lowest: $(BASE)
 	$(PYTHON) -m venv --clear $(LOWEST)
@@ -28,7 +28,7 @@ lowest: $(BASE)
 	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct \
 		-e ".[dev,train,ik,bvh,live,export]"
 	$(LOWEST)/bin/python -m pytest -p no:cacheprovider tests/embodiments tests/motions tests/mappings tests/simulation \
-		tests/envs tests/test_cli.py
+		tests/envs tests/teleoperation tests/agents tests/test_cli.py
 
 lint: $(DEVELOPMENT)
 	$(BIN)/ruff check .
