@@ -1,9 +1,9 @@
 """Measure the environment against its bars, as ratios, in one run on one core.
 
-Run it from anywhere: ``python scripts/benchmark_environment.py [--out FILE.json] [--quick]``. Times are CPU times of
-the measuring thread, so that other work on the machine disturbs them less; every figure is a median. The raw cost of
-physics is that of the bare ``stepSimulation`` (or ``mj_step``) calls inside the very steps that it is compared with,
-because a machine's speed changes from one moment to the next.
+Run it from anywhere: ``python scripts/benchmark_environment.py [--out FILE.json] [--quick]``. Every figure is a
+median. Times are CPU times of the measuring thread, so that other work on the machine disturbs them less. Only the
+share of raw physics compares wall-clock times: those of the bare ``stepSimulation`` (or ``mj_step``) calls with the
+very steps around them, because a machine's speed changes from one moment to the next.
 """
 
 from __future__ import annotations

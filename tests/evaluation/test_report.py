@@ -50,6 +50,14 @@ def test_many_bars_become_rows_sorted_by_value():
     assert text.index(">chain 29<") < text.index(">chain 0<")
 
 
+@pytest.mark.parametrize(("count", "legend"), [(8, True), (9, False)])
+def test_more_series_than_colours_are_named_beside_their_dots(count, legend):
+    series = {f"chain {i}": [Estimate.exactly(float(count - i))] for i in range(count)}
+    text = bar_svg(BarPlot("Nine", "cm", ["E"], series))
+    assert ("rx=" in text) == legend  # bars with a legend, or rows without
+    assert (text.index(">chain 0<") < text.index(f">chain {count - 1}<")) == legend
+
+
 def test_uneven_tables_plots_and_playbacks_are_refused(embedded):
     with pytest.raises(OptionError, match="2 columns"):
         Table("t", [Column("a"), Column("b")], [[1.0]])

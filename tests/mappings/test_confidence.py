@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from syda_gym.embodiments import landmark_error
-from syda_gym.mappings import fit
+from syda_gym.mappings import fit, general
 from syda_gym.mappings.confidence import action_maximum
+from syda_gym.mappings.fitting import fit_many
 
 from .conftest import make_pair
 
@@ -52,3 +53,16 @@ def test_chains_combine_bounds_and_flags(adult_kid, kid_pepper):
     assert (chain.error_bound(frames) > link.error_bound(between)).all()
     assert np.array_equal(chain.difficulty(frames), np.maximum(hop.difficulty(frames), link.difficulty(between)))
     assert np.array_equal(chain.unfamiliar(frames), hop.unfamiliar(frames) | link.unfamiliar(between))
+
+
+def test_folds_share_the_fits_that_hold_out_the_same_two_actions(monkeypatch):
+    pair = make_pair("adult", "pepper", actions=4, frames=12, seed=5)
+    folds = [pair.without_actions([name]) for name in pair.action_names]
+    trained, train = [], general.train
+    monkeypatch.setattr(general, "train", lambda jobs, *rest: trained.extend(jobs) or train(jobs, *rest))
+    together = fit_many(folds, epochs=3)
+    assert len(trained) == 4 + 6  # each fold, and each pair of actions once rather than twice
+    for fold, mapping in zip(folds, together, strict=True):
+        alone = fit(fold, epochs=3)
+        assert np.isclose(mapping.confidence.bound, alone.confidence.bound, rtol=1e-4)
+        assert np.allclose(mapping(pair.source), alone(pair.source), atol=1e-4)

@@ -25,8 +25,8 @@ text { font: 13px system-ui, 'DejaVu Sans', sans-serif; fill: var(--ink); }
 
 
 def bar_svg(plot: BarPlot) -> str:
-    """Bars in groups; with very many of them, one row of dots a bar."""
-    if len(plot.groups) * len(plot.series) > _MOST_BARS:
+    """Bars in groups; with very many of them, or more series than colours, one row of dots a series."""
+    if len(plot.groups) * len(plot.series) > _MOST_BARS or len(plot.series) > COLOURS:
         return _rows(plot)
     return _bars(plot)
 
