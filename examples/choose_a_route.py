@@ -4,8 +4,8 @@ python examples/choose_a_route.py
 """
 
 import syda_gym
-from syda_gym.transferability.routing import ranked_routes
-from syda_gym.transferability.suggestion import suggest
+from syda_gym.routes.routing import ranked_routes
+from syda_gym.routes.suggestion import suggest
 
 print("from > to          C (capability)   L (reach)   T")
 for source, target in (("adult", "kid"), ("kid", "pepper"), ("adult", "pepper"), ("adult", "nao"), ("pepper", "nao")):

@@ -13,10 +13,10 @@ import time
 import numpy as np
 
 import syda_gym
+from syda_gym.routes.choice import choose_mapping
 from syda_gym.teleoperation import LoopSettings, TeleoperationLoop, UdpSource, run
-from syda_gym.teleoperation.bullet import BulletSink
-from syda_gym.teleoperation.choosing import choose_mapping
-from syda_gym.teleoperation.packets import encode_frame
+from syda_gym.teleoperation.incoming.packets import encode_frame
+from syda_gym.teleoperation.outgoing.bullet import BulletSink
 
 seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 8.0
 mapping, _ = choose_mapping("adult", "pepper")

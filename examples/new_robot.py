@@ -12,9 +12,9 @@ import numpy as np
 
 import syda_gym
 from syda_gym.files import asset
-from syda_gym.teleoperation.choosing import choose_mapping
-from syda_gym.teleoperation.robot_setup import add_robot
-from syda_gym.transferability.suggestion import suggest
+from syda_gym.routes.choice import choose_mapping
+from syda_gym.routes.suggestion import suggest
+from syda_gym.teleoperation.setup.robot_setup import add_robot
 
 urdf = sys.argv[1] if len(sys.argv) > 1 else asset("robots", "nao.urdf")
 added = add_robot(urdf, "newcomer", replace_existing=True)

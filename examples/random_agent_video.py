@@ -8,7 +8,7 @@ import sys
 import gymnasium as gym
 
 import syda_gym  # noqa: F401  (registers the environment)
-from syda_gym.simulation.video import write_video
+from syda_gym.simulation.pictures.video import write_video
 
 film = sys.argv[1] if len(sys.argv) > 1 else "random_agent.mp4"
 env = gym.make("SydaTeleop-v0", render_mode="rgb_array")

@@ -10,9 +10,9 @@ import sys
 
 import syda_gym
 from syda_gym.agents.bundle import save_agent
-from syda_gym.agents.config import ResidualConfig
+from syda_gym.agents.residual.config import ResidualConfig
+from syda_gym.agents.residual.residual_training import train_residual
 from syda_gym.agents.rollout import evaluate, mean_of
-from syda_gym.agents.training import train_residual
 
 steps = int(sys.argv[1]) if len(sys.argv) > 1 else 60_000
 actions = sorted(syda_gym.load_motions("embedded").families)

@@ -27,8 +27,8 @@ from syda_gym.embodiments import landmark_error
 from syda_gym.files import write_json
 from syda_gym.mappings import fit
 from syda_gym.mappings.card import versions
-from syda_gym.mappings.coded import CodedMapping
-from syda_gym.mappings.mink_ik import MinkArmCoder
+from syda_gym.mappings.coded_mapping import CodedMapping
+from syda_gym.mappings.coding.mink_ik import MinkArmCoder
 from syda_gym.motions.clip import PairedMotions
 from syda_gym.motions.loading import load_motions, resampled
 

@@ -36,13 +36,13 @@ from syda_gym.files import read_json, write_json
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.motions.clip import MotionClip
 from syda_gym.motions.loading import load_motions
+from syda_gym.routes.choice import choose_mapping, geometric_mapping
 from syda_gym.teleoperation import LoopSettings, TeleoperationLoop, Tick, UdpSink, UdpSource, run
-from syda_gym.teleoperation.choosing import choose_mapping, geometric_mapping
-from syda_gym.teleoperation.inbox import Inbox
+from syda_gym.teleoperation.incoming.inbox import Inbox
+from syda_gym.teleoperation.incoming.ordering import Ordering
+from syda_gym.teleoperation.incoming.packets import PacketDecoder, PacketError, encode_frame
 from syda_gym.teleoperation.journal import Journal, replay_journal
-from syda_gym.teleoperation.ordering import Ordering
-from syda_gym.teleoperation.packets import PacketDecoder, PacketError, encode_frame
-from syda_gym.teleoperation.statistics import LiveStatistics
+from syda_gym.teleoperation.live_statistics import LiveStatistics
 
 
 def main() -> None:
@@ -163,7 +163,7 @@ def _drain(sock: socket.socket) -> None:
 
 def throughput(args: argparse.Namespace) -> dict[str, Any]:
     """Frames per second of the whole loop with different mappings; mink is the rival."""
-    from syda_gym.mappings.fitting import fit
+    from syda_gym.mappings.fitting.fit import fit
 
     frames, standing = operator_frames(600), standing_frames(30.0)
     pair = load_motions("embedded", fps=5.0).pair("adult", "pepper")

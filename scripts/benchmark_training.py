@@ -12,13 +12,13 @@ import os
 import time
 from pathlib import Path
 
-from syda_gym.agents.classical import make_rival
-from syda_gym.agents.config import ResidualConfig
-from syda_gym.agents.recording import Ground
-from syda_gym.agents.training import train_on_streams
+from syda_gym.agents.classical.rivals import make_rival
+from syda_gym.agents.residual.config import ResidualConfig
+from syda_gym.agents.residual.residual_training import train_on_streams
+from syda_gym.agents.streams.ground import Ground
 from syda_gym.files import asset, write_json
 from syda_gym.mappings.storage import load_mapping
-from syda_gym.motions.synthetic import generate
+from syda_gym.motions.synthetic.generator import generate
 
 
 def main() -> None:

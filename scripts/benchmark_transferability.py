@@ -18,11 +18,11 @@ import numpy as np
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.robot import Robot
 from syda_gym.files import write_json
-from syda_gym.transferability.arms import canonical_arms
-from syda_gym.transferability.metric import transferability
-from syda_gym.transferability.paper import paper_human
-from syda_gym.transferability.store import WorkspaceStore
-from syda_gym.transferability.workspace import TIP, arm_length, sobol_angles, workspace_from_angles
+from syda_gym.routes.metric import transferability
+from syda_gym.routes.paper import paper_human
+from syda_gym.routes.workspace.arms import canonical_arms
+from syda_gym.routes.workspace.sampling import TIP, arm_length, sobol_angles, workspace_from_angles
+from syda_gym.routes.workspace.store import WorkspaceStore
 
 LOOP_SAMPLES = 20_000
 SAMPLES = 2**20
@@ -81,7 +81,7 @@ def batched(robot: Robot, samples: int) -> float:
 
 def six_pairs(measure: Callable[..., Any], definition: str) -> tuple[float, dict[tuple[str, str], Any]]:
     """Seconds and results of six ordered pairs from nothing cached."""
-    from syda_gym.transferability import workspace
+    from syda_gym.routes.workspace import sampling as workspace
 
     workspace._sobol.cache_clear()
     humans = {name: paper_human(name) for name in ("adult", "kid")} if definition == "general" else {}

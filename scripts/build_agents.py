@@ -17,7 +17,7 @@ from pathlib import Path
 from study_agents import CELLS, Study, stored_seeds
 
 from syda_gym.agents.bundle import load_agent, read_card, save_agent
-from syda_gym.agents.streams import score_streams
+from syda_gym.agents.streams.streams import score_streams
 from syda_gym.files import asset
 
 ROUTES = (("adult", "pepper"), ("adult", "kid", "pepper"))

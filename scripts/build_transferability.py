@@ -13,11 +13,11 @@ import numpy as np
 
 from syda_gym.embodiments import catalog
 from syda_gym.files import read_json, write_json
-from syda_gym.motions.synthetic import BODIES
-from syda_gym.transferability.general import Sampling
-from syda_gym.transferability.metric import compare_arms, pair_arms
-from syda_gym.transferability.shipped import FILE, Rows, comparison_key
-from syda_gym.transferability.store import WorkspaceStore
+from syda_gym.motions.synthetic.generator import BODIES
+from syda_gym.routes.general import Sampling
+from syda_gym.routes.metric import compare_arms, pair_arms
+from syda_gym.routes.shipped import FILE, Rows, comparison_key
+from syda_gym.routes.workspace.store import WorkspaceStore
 
 TOLERANCE = 1e-9
 """Other processors round differently in the last digits."""

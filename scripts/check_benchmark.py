@@ -107,7 +107,7 @@ class Clock:
 
 def overhead(motions_name: str) -> dict[str, Any]:
     """Shares of one benchmark's processor time: fits, episodes, and what the harness adds."""
-    from syda_gym.agents.classical import BaseAlone
+    from syda_gym.agents.classical.rivals import BaseAlone
     from syda_gym.envs.teleop import SydaTeleopEnv
     from syda_gym.evaluation.benchmark import runner, work
     from syda_gym.evaluation.chains import Links

@@ -20,7 +20,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "syda_gym"
 ROOMS = {
     "embodiments": "Bodies",
     "motions": "Motions",
-    "transferability": "Transferability",
+    "routes": "Routes",
     "simulation": "Simulation",
     "mappings": "Mappings",
     "envs": "Environments",

@@ -18,7 +18,8 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.files import asset, write_json
 from syda_gym.motions.loading import load_motions
-from syda_gym.simulation.backend import MotorConditions, make_world
+from syda_gym.simulation.backend import MotorConditions
+from syda_gym.simulation.making import make_world
 from syda_gym.simulation.rates import Rates
 from syda_gym.simulation.servo import ServoConstants, ServoWorld
 

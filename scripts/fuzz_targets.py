@@ -13,25 +13,25 @@ from fuzz_damage import Damage, in_archive, in_bytes, in_json, in_json_lines, in
 
 import syda_gym
 from syda_gym.agents.bundle import load_agent, save_agent
-from syda_gym.agents.checkpoint import load_checkpoint
-from syda_gym.agents.classical import make_rival
+from syda_gym.agents.classical.rivals import make_rival
 from syda_gym.agents.interface import Interface
-from syda_gym.agents.predictor import Predictor, input_count
-from syda_gym.agents.tcn import TcnShape
+from syda_gym.agents.learned.predictor import Predictor, input_count
+from syda_gym.agents.learned.tcn import TcnShape
+from syda_gym.agents.residual.checkpoint import load_checkpoint
 from syda_gym.embodiments import catalog
+from syda_gym.embodiments.kinematics.urdf import read_urdf
 from syda_gym.embodiments.robot import Robot
-from syda_gym.embodiments.urdf import read_urdf
 from syda_gym.evaluation.benchmark.config import BenchmarkConfig
 from syda_gym.files import asset, fingerprint, read_json, write_json
 from syda_gym.motions.dataset import write_dataset
 from syda_gym.motions.loading import FORMATS
 from syda_gym.teleoperation import TeleoperationLoop
+from syda_gym.teleoperation.incoming.packets import PacketDecoder, encode_frame, encode_request
 from syda_gym.teleoperation.journal import Journal, replay_journal
-from syda_gym.teleoperation.packets import PacketDecoder, encode_frame, encode_request
 from syda_gym.teleoperation.tick import Tick
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
-from motions import paper_workbooks, recordings  # sample recordings are written by the tests
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from tests.motions import paper_workbooks, recordings  # sample recordings are written by the tests
 
 __all__ = ["Target", "all_targets"]
 

@@ -24,21 +24,21 @@ import numpy as np
 
 from syda_gym.agents.agent import Agent
 from syda_gym.agents.bundle import load_agent, save_agent
-from syda_gym.agents.classical import CONTACT_RIVALS, RIVALS, make_rival
-from syda_gym.agents.config import ResidualConfig
+from syda_gym.agents.classical.rivals import CONTACT_RIVALS, RIVALS, make_rival
+from syda_gym.agents.classical.tuning import tune
 from syda_gym.agents.interface import Interface
-from syda_gym.agents.predictor_training import PredictorConfig, train_predictor
-from syda_gym.agents.recording import Ground
+from syda_gym.agents.predictor.predictor_training import PredictorConfig, train_predictor
+from syda_gym.agents.residual.config import ResidualConfig
+from syda_gym.agents.residual.residual_training import train_on_streams
 from syda_gym.agents.rollout import EpisodeResult, evaluate
-from syda_gym.agents.streams import Streams, score_streams
-from syda_gym.agents.training import train_on_streams
-from syda_gym.agents.tuning import tune
-from syda_gym.envs.options import TeleopOptions
+from syda_gym.agents.streams.ground import Ground
+from syda_gym.agents.streams.streams import Streams, score_streams
+from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.files import asset, read_json, write_json
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.mappings.storage import load_mapping
 from syda_gym.motions.clip import Motions
-from syda_gym.motions.synthetic import generate
+from syda_gym.motions.synthetic.generator import generate
 from syda_gym.simulation.rates import Rates
 
 TRAIN = ("reach", "wave", "point", "lift", "circle", "push", "work")

@@ -27,19 +27,19 @@ from scipy.interpolate import CubicSpline
 
 from syda_gym.agents.agent import BaseAlone
 from syda_gym.agents.bundle import load_agent, save_agent
-from syda_gym.agents.classical import make_rival
+from syda_gym.agents.classical.projection import Projection, capsule_model
+from syda_gym.agents.classical.rivals import make_rival
 from syda_gym.agents.figures import Figures
 from syda_gym.agents.interface import Interface
-from syda_gym.agents.predictor_training import PredictorConfig, train_predictor
-from syda_gym.agents.projection import Projection, capsule_model
-from syda_gym.agents.recording import Ground
+from syda_gym.agents.predictor.predictor_training import PredictorConfig, train_predictor
 from syda_gym.agents.rollout import EpisodeResult, evaluate, mean_of
-from syda_gym.agents.streams import Streams, join
-from syda_gym.envs.options import TeleopOptions
+from syda_gym.agents.streams.ground import Ground
+from syda_gym.agents.streams.streams import Streams, join
+from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.files import asset, read_json, write_json
 from syda_gym.mappings.limits import limit_speed
 from syda_gym.mappings.storage import load_mapping
-from syda_gym.motions.synthetic import generate
+from syda_gym.motions.synthetic.generator import generate
 
 TRAIN = ("reach", "wave", "point", "lift", "circle", "push", "work")
 VALIDATION = ("swing", "bow")

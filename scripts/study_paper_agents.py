@@ -15,12 +15,12 @@ from collections import defaultdict
 from pathlib import Path
 
 from syda_gym.agents.agent import Agent, BaseAlone
-from syda_gym.agents.classical import make_rival
-from syda_gym.agents.config import ResidualConfig
+from syda_gym.agents.classical.rivals import make_rival
 from syda_gym.agents.figures import Figures, mean_figures
 from syda_gym.agents.interface import Interface
+from syda_gym.agents.residual.config import ResidualConfig
+from syda_gym.agents.residual.residual_training import train_residual
 from syda_gym.agents.rollout import evaluate
-from syda_gym.agents.training import train_residual
 from syda_gym.agents.work import find_agent, shipped_agents
 from syda_gym.files import write_json
 from syda_gym.motions.loading import load_motions

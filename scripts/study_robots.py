@@ -10,18 +10,18 @@ import time
 from pathlib import Path
 
 from syda_gym.embodiments import catalog
-from syda_gym.embodiments.example_robots import example_urdfs, two_armed_robots
+from syda_gym.embodiments.discovery.example_robots import example_urdfs, two_armed_robots
 from syda_gym.embodiments.robot import Robot
 from syda_gym.files import write_bytes, write_text
-from syda_gym.transferability.metric import Transferability, transferability
-from syda_gym.transferability.pictures import clouds_png, graph_png
-from syda_gym.transferability.routing import BodyGraph, Route, best_route
+from syda_gym.routes.metric import Transferability, transferability
+from syda_gym.routes.pictures import clouds_png, graph_png
+from syda_gym.routes.routing import BodyGraph, Route, best_route
 
 SAMPLES, REPEATS = 2**18, 2
 
 HEADER = """# Arms found in the robots of other makers
 
-What `syda_gym.embodiments.discovery.discover` found, without any hint, in the URDFs of the PyPI package
+What `syda_gym.embodiments.discovery.arms.discover` found, without any hint, in the URDFs of the PyPI package
 [`example-robot-data`](https://pypi.org/project/example-robot-data/) {version} (`pip install 'syda-gym[robots]'`):
 {two} of its {all} URDFs have two arms. The others are quadrupeds, drones, single arms, single hands and one file that
 no parser takes. Written by `scripts/study_robots.py`.

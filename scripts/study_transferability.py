@@ -19,7 +19,7 @@ from scipy.stats import spearmanr
 
 from syda_gym.embodiments import catalog
 from syda_gym.files import read_json, write_bytes, write_json
-from syda_gym.transferability.measured import measured_bodies
+from syda_gym.routes.measured import measured_bodies
 
 Names = tuple[str, ...]
 DRAWS = 10
@@ -89,8 +89,8 @@ def carried(route: Names, sides: dict[str, set[str]]) -> float:
 
 def recorded() -> dict[str, dict[str, float]]:
     """Errors on the paper's recordings beside both T."""
-    from syda_gym.transferability.metric import transferability
-    from syda_gym.transferability.paper import PAPER_LENGTHS, paper_human
+    from syda_gym.routes.metric import transferability
+    from syda_gym.routes.paper import PAPER_LENGTHS, paper_human
 
     reach = {"pepper": catalog.get("pepper").reach, **{n: sum(PAPER_LENGTHS[n]) for n in ("adult", "kid")}}
     bodies: dict[str, Any] = {"pepper": "pepper", "adult": paper_human("adult"), "kid": paper_human("kid")}
@@ -115,8 +115,8 @@ def main() -> None:
     if arguments.study:
         study = read_json(arguments.study)
     else:
-        from syda_gym.evaluation.prediction import validate
-        from syda_gym.evaluation.prediction_picture import prediction_png
+        from syda_gym.evaluation.prediction.picture import prediction_png
+        from syda_gym.evaluation.prediction.study import validate
 
         result = validate()
         write_bytes(arguments.picture, prediction_png(result))

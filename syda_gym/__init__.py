@@ -21,7 +21,6 @@ import gymnasium
 from syda_gym.errors import SydaError
 
 if TYPE_CHECKING:
-    from syda_gym import transferability as transferability
     from syda_gym.embodiments.catalog import get as embodiment
     from syda_gym.embodiments.embodiment import Embodiment, landmark_error
     from syda_gym.embodiments.human import HumanSkeleton
@@ -29,13 +28,14 @@ if TYPE_CHECKING:
     from syda_gym.envs.teleop import SydaTeleopEnv
     from syda_gym.envs.vector import SydaTeleopVectorEnv
     from syda_gym.mappings.chain import ChainMapping
-    from syda_gym.mappings.fitting import fit
+    from syda_gym.mappings.fitting.fit import fit
     from syda_gym.mappings.mapping import Mapping
     from syda_gym.mappings.storage import load_mapping, save_mapping
     from syda_gym.motions.clip import Motions, PairedMotions
     from syda_gym.motions.loading import load_motions
     from syda_gym.motions.readers.npz import save_motions
-    from syda_gym.transferability.routing import best_route, ranked_routes
+    from syda_gym.routes.metric import transferability
+    from syda_gym.routes.routing import best_route, ranked_routes
 
 __version__ = "0.1.0"
 
@@ -66,8 +66,8 @@ __all__ = [
 
 ENV_ID = "SydaTeleop-v0"
 
-# Public name -> the module that holds it and its name there (None: the module itself).
-_LAZY: dict[str, tuple[str, str | None]] = {
+# Public name -> the module that holds it and its name there.
+_LAZY: dict[str, tuple[str, str]] = {
     "ChainMapping": ("mappings.chain", "ChainMapping"),
     "Embodiment": ("embodiments.embodiment", "Embodiment"),
     "HumanSkeleton": ("embodiments.human", "HumanSkeleton"),
@@ -77,17 +77,16 @@ _LAZY: dict[str, tuple[str, str | None]] = {
     "Robot": ("embodiments.robot", "Robot"),
     "SydaTeleopEnv": ("envs.teleop", "SydaTeleopEnv"),
     "SydaTeleopVectorEnv": ("envs.vector", "SydaTeleopVectorEnv"),
-    "best_route": ("transferability.routing", "best_route"),
+    "best_route": ("routes.routing", "best_route"),
     "embodiment": ("embodiments.catalog", "get"),
-    "fit": ("mappings.fitting", "fit"),
+    "fit": ("mappings.fitting.fit", "fit"),
     "landmark_error": ("embodiments.embodiment", "landmark_error"),
     "load_mapping": ("mappings.storage", "load_mapping"),
     "load_motions": ("motions.loading", "load_motions"),
-    "ranked_routes": ("transferability.routing", "ranked_routes"),
+    "ranked_routes": ("routes.routing", "ranked_routes"),
     "save_mapping": ("mappings.storage", "save_mapping"),
     "save_motions": ("motions.readers.npz", "save_motions"),
-    # A module that can be called: syda_gym.transferability("adult", "pepper").
-    "transferability": ("transferability", None),
+    "transferability": ("routes.metric", "transferability"),
 }
 
 
@@ -96,8 +95,7 @@ def __getattr__(name: str) -> Any:
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}; public are {', '.join(__all__)}")
     module, attribute = _LAZY[name]
-    loaded = import_module(f"{__name__}.{module}")
-    return loaded if attribute is None else getattr(loaded, attribute)
+    return getattr(import_module(f"{__name__}.{module}"), attribute)
 
 
 def __dir__() -> list[str]:

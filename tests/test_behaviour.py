@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from .behaviour import RECORDED, SAMPLES, digest, machine
+from tests.behaviour import RECORDED, SAMPLES, digest, machine
 
 recorded = json.loads(RECORDED.read_text())
 

@@ -10,9 +10,9 @@ import sys
 import pytest
 from typer.testing import CliRunner
 
-from syda_gym.cli import app
+from syda_gym.cli.main import app
 
-MAIN = [sys.executable, "-c", "from syda_gym.cli import main; main()"]
+MAIN = [sys.executable, "-c", "from syda_gym.cli.main import main; main()"]
 
 
 def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -39,7 +39,7 @@ def test_an_error_is_one_line_without_a_traceback(arguments, words, tmp_path, mo
 
 def test_help_loads_nothing_heavy():
     code = (
-        "import sys\nfrom syda_gym.cli import app\nfrom typer.testing import CliRunner\n"
+        "import sys\nfrom syda_gym.cli.main import app\nfrom typer.testing import CliRunner\n"
         "assert CliRunner().invoke(app, ['--help']).exit_code == 0\n"
         "heavy = {'torch', 'pybullet', 'stable_baselines3', 'matplotlib', 'pinocchio', 'scipy.stats', 'ray'}\n"
         "print(sorted(heavy & set(sys.modules)))"

@@ -153,7 +153,7 @@ def parse_with_cli(words: list[str]) -> None:
     """Parses a command line with the real command line interface, without running it."""
     import typer
 
-    from syda_gym.cli import app
+    from syda_gym.cli.main import app
 
     command: Any = typer.main.get_command(app)
     # Placeholders such as FILE or DIR stand for paths that need not exist here.

@@ -12,14 +12,14 @@ import socket
 from pathlib import Path
 
 import pytest
-from motions import recordings
 from test_docs import commands
 from typer.testing import CliRunner
 
 import syda_gym
-from syda_gym.cli import app
+from syda_gym.cli.main import app
 from syda_gym.files import asset
 from syda_gym.motions import write_dataset
+from tests.motions import recordings
 
 # Beginning of a command -> why it is not run.
 PARSED = {

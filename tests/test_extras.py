@@ -16,7 +16,7 @@ EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["option
 FEATURES = {
     "train": (
         "sb3_contrib",
-        "from syda_gym.agents.algorithms import _off_policy_class as use; use('tqc')",
+        "from syda_gym.agents.residual.algorithms import _off_policy_class as use; use('tqc')",
     ),
     "export": (
         "onnx",
@@ -29,12 +29,12 @@ FEATURES = {
     ),
     "live": (
         "websockets",
-        "import syda_gym; from syda_gym.teleoperation.sources import WebSocketSource;"
+        "import syda_gym; from syda_gym.teleoperation.incoming.sources import WebSocketSource;"
         "WebSocketSource(syda_gym.embodiment('adult')).start()",
     ),
     "naoqi": (
         "qi",
-        "import syda_gym; from syda_gym.teleoperation.naoqi import NaoqiSink;"
+        "import syda_gym; from syda_gym.teleoperation.outgoing.naoqi import NaoqiSink;"
         "NaoqiSink(syda_gym.embodiment('pepper')).open()",
     ),
     "ik": (
@@ -79,7 +79,7 @@ def test_missing_extra_is_named(extra: str, tmp_path: Path) -> None:
 def test_missing_robots_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     from importlib import metadata
 
-    from syda_gym.embodiments import example_robots
+    from syda_gym.embodiments.discovery import example_robots
     from syda_gym.errors import MissingExtraError
 
     def nothing(_: str) -> None:

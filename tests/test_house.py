@@ -100,3 +100,20 @@ def test_no_file_grows_beyond_500_lines() -> None:
     folders = [ROOT / part for part in ("syda_gym", "scripts", "tests", "examples")]
     files = [path for folder in folders for path in folder.rglob("*") if path.suffix in (".py", ".js", ".css")]
     assert not {name(path): count for path in files if (count := len(path.read_text().splitlines())) >= 500}
+
+
+def test_no_folder_grows_beyond_what_one_sees_at_a_glance() -> None:
+    folders = {path.parent for path in MODULES}
+    counts = {name(folder): len(list(folder.glob("*.py"))) for folder in folders}
+    assert not {folder: count for folder, count in counts.items() if count > 14}
+
+
+def test_every_room_says_in_one_sentence_what_lives_there() -> None:
+    silent = [name(path) for path in PACKAGE.rglob("__init__.py") if not ast.get_docstring(ast.parse(path.read_text()))]
+    assert not silent
+
+
+def test_tests_mirror_the_rooms() -> None:
+    rooms = {path.parent.relative_to(PACKAGE) for path in MODULES}
+    tested = {path.parent.relative_to(ROOT / "tests") for path in (ROOT / "tests").rglob("test_*.py")}
+    assert not {str(room) for room in tested if room not in rooms and str(room) != "assets"}

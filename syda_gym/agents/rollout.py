@@ -11,7 +11,7 @@ import numpy as np
 from syda_gym.agents.agent import Agent
 from syda_gym.agents.figures import Figures, episode_figures, mean_figures
 from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.envs.options import TeleopOptions
+from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.envs.teleop import SydaTeleopEnv
 from syda_gym.errors import AgentError
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.agents.agent import Agent, BaseAlone
-from syda_gym.agents.classical import Ema, Kalman, Lead, OneEuro
+from syda_gym.agents.classical.projection import Projection
+from syda_gym.agents.classical.rivals import Ema, Kalman, Lead, OneEuro
 from syda_gym.agents.interface import Interface
-from syda_gym.agents.predictor import Predictor
-from syda_gym.agents.projection import Projection
-from syda_gym.agents.residual import ResidualPolicy
+from syda_gym.agents.learned.policy import ResidualPolicy
+from syda_gym.agents.learned.predictor import Predictor
 from syda_gym.errors import AgentError, nearest_name
 
 __all__ = ["AGENTS", "build_stack", "stack_arrays", "stack_spec"]

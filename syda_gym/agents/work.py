@@ -12,19 +12,19 @@ import numpy as np
 
 from syda_gym.agents.agent import Agent, BaseAlone
 from syda_gym.agents.bundle import load_agent, read_card, save_agent
-from syda_gym.agents.classical import RIVALS, Lead, make_rival
-from syda_gym.agents.config import ResidualConfig
+from syda_gym.agents.classical.rivals import RIVALS, Lead, make_rival
+from syda_gym.agents.classical.tuning import Tuned, tune
 from syda_gym.agents.figures import Figures
 from syda_gym.agents.interface import Interface
-from syda_gym.agents.predictor_training import PredictorConfig, train_predictor
-from syda_gym.agents.recording import Ground
+from syda_gym.agents.predictor.predictor_training import PredictorConfig, train_predictor
+from syda_gym.agents.residual.config import ResidualConfig
+from syda_gym.agents.residual.residual_training import train_residual
 from syda_gym.agents.rollout import EpisodeResult, evaluate, mean_of
-from syda_gym.agents.streams import score_streams
-from syda_gym.agents.training import train_residual
-from syda_gym.agents.tuning import Tuned, tune
+from syda_gym.agents.streams.ground import Ground
+from syda_gym.agents.streams.streams import score_streams
 from syda_gym.embodiments.catalog import resolve
 from syda_gym.embodiments.human import HumanSkeleton
-from syda_gym.envs.options import TeleopOptions
+from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.envs.teleop import SydaTeleopEnv
 from syda_gym.errors import AgentError, nearest_name
 from syda_gym.files import asset
@@ -235,8 +235,8 @@ def film(
     Returns:
         Figures of the episode.
     """
-    from syda_gym.simulation.camera import Camera
-    from syda_gym.simulation.video import write_video
+    from syda_gym.simulation.pictures.camera import Camera
+    from syda_gym.simulation.pictures.video import write_video
 
     given = options if isinstance(options, TeleopOptions) else TeleopOptions(**options)
     env = SydaTeleopEnv(options=TeleopOptions.of(given, {"action_mode": "position"}))
@@ -294,9 +294,9 @@ def export_bundle(
         AgentError: a part without a graph, no mapping for the bundle's route, or the graph differs from the original by
             more than a microradian.
     """
-    from syda_gym.agents.export import agent_parity, card_path, export_onnx, runner_parity
-    from syda_gym.agents.onnx_runners import OnnxAgent, OnnxRunner
-    from syda_gym.agents.runner import Runner, bundle_path, find_mapping, stored_interface
+    from syda_gym.agents.deployment.export import agent_parity, card_path, export_onnx, runner_parity
+    from syda_gym.agents.deployment.numpy_runner import Runner, bundle_path, find_mapping, stored_interface
+    from syda_gym.agents.deployment.onnx_runners import OnnxAgent, OnnxRunner
 
     source = bundle_path(bundle)
     interface = stored_interface(read_card(source))

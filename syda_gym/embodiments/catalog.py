@@ -62,7 +62,7 @@ def resolve(body: str | os.PathLike[str] | Embodiment) -> Embodiment:
     if text.endswith((".yaml", ".yml")):
         return Robot.read(text)
     if text.endswith(".urdf"):
-        from syda_gym.embodiments.discovery import discover_robot
+        from syda_gym.embodiments.discovery.arms import discover_robot
 
         return discover_robot(text)
     return get(text)

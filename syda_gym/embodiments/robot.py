@@ -7,21 +7,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
 
-from syda_gym.embodiments.arm_chain import ArmChain
-from syda_gym.embodiments.coupled import coupled_range
 from syda_gym.embodiments.embodiment import SIDES, Embodiment, Feature, FloatArray, Side
-from syda_gym.embodiments.urdf import arm_chain, read_urdf
+from syda_gym.embodiments.kinematics.arm_chain import ArmChain
+from syda_gym.embodiments.kinematics.coupled import coupled_range
+from syda_gym.embodiments.kinematics.urdf import arm_chain, read_urdf
 from syda_gym.errors import EmbodimentError, nearest_name
 from syda_gym.files import fingerprint
-
-if TYPE_CHECKING:
-    from syda_gym.embodiments.limb_ik import LimbIK
 
 __all__ = ["ArmDescription", "CoupledLimit", "Robot", "RobotDescription"]
 
@@ -134,6 +131,7 @@ class Robot(Embodiment):
         speed: speed limits ``(n,)`` [rad/s].
         effort: effort limits ``(n,)`` [N m].
         chains: kinematics per arm, in the order of ``sides``.
+        memo: what other files have worked out for this robot and keep as long as it lives, such as its ``LimbIK``.
 
     Raises:
         EmbodimentError: not a URDF, unknown joints or links, missing limits, arms of zero length.
@@ -141,6 +139,7 @@ class Robot(Embodiment):
 
     def __init__(self, description: RobotDescription) -> None:
         self.description = description
+        self.memo: dict[type, Any] = {}
         self.name = description.name
         self.height = description.height
         given = [arm.side for arm in description.arms]
@@ -199,13 +198,6 @@ class Robot(Embodiment):
         points = self.arm_points(np.zeros(len(self.joint_names)))[0]
         lengths: FloatArray = np.linalg.norm(np.diff(points, axis=1), axis=-1)
         return lengths
-
-    @cached_property
-    def limb_ik(self) -> LimbIK:
-        """Inverse kinematics on limb directions, made once per robot."""
-        from syda_gym.embodiments.limb_ik import LimbIK
-
-        return LimbIK(self)
 
     def arm_points(self, frames: ArrayLike) -> FloatArray:
         """Shoulder, elbow and wrist of each arm, ``(N, arms, 3, 3)`` [m], torso frame."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from syda_gym.envs.options import TeleopOptions as TeleopOptions
+    from syda_gym.envs.task.options import TeleopOptions as TeleopOptions
     from syda_gym.envs.teleop import SydaTeleopEnv as SydaTeleopEnv
     from syda_gym.envs.vector import SydaTeleopVectorEnv as SydaTeleopVectorEnv
 
-_LAZY = {"TeleopOptions": "options", "SydaTeleopEnv": "teleop", "SydaTeleopVectorEnv": "vector"}
+_LAZY = {"TeleopOptions": "task.options", "SydaTeleopEnv": "teleop", "SydaTeleopVectorEnv": "vector"}
 
 __all__ = ["SydaTeleopEnv", "SydaTeleopVectorEnv", "TeleopOptions"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from syda_gym.embodiments.embodiment import Embodiment
 from syda_gym.embodiments.robot import Robot
 from syda_gym.envs.fleet import Fleet
-from syda_gym.envs.observation import ObservationLayout
-from syda_gym.envs.options import TeleopOptions
+from syda_gym.envs.task.observation import ObservationLayout
+from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.simulation.rates import Rates
 
 __all__ = ["Face"]

@@ -14,14 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.envs.observation import ObservationLayout, teleop_layout
-from syda_gym.envs.options import TeleopOptions
-from syda_gym.envs.repertoire import Repertoire
-from syda_gym.envs.scripts import Scripts
-from syda_gym.envs.starts import StartSampler
-from syda_gym.envs.tracking import TERMS, in_order, reward_terms
+from syda_gym.envs.task.observation import ObservationLayout, teleop_layout
+from syda_gym.envs.task.options import TeleopOptions
+from syda_gym.envs.task.repertoire import Repertoire
+from syda_gym.envs.task.scripts import Scripts
+from syda_gym.envs.task.starts import StartSampler
+from syda_gym.envs.task.tracking import TERMS, in_order, reward_terms
 from syda_gym.errors import OptionError
-from syda_gym.simulation.backend import MotorConditions, make_world
+from syda_gym.simulation.backend import MotorConditions
+from syda_gym.simulation.making import make_world
 
 __all__ = ["EpisodeWish", "Fleet"]
 

@@ -11,9 +11,9 @@ import gymnasium
 
 from syda_gym.envs.fleet import Fleet
 from syda_gym.errors import OptionError
-from syda_gym.simulation.camera import Camera, CameraView, Picture
-from syda_gym.simulation.video import write_video
-from syda_gym.simulation.window import Window
+from syda_gym.simulation.pictures.camera import Camera, CameraView, Picture
+from syda_gym.simulation.pictures.video import write_video
+from syda_gym.simulation.pictures.window import Window
 
 __all__ = ["Painter", "RecordVideo"]
 

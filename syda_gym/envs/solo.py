@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.envs.fleet import Fleet
-from syda_gym.envs.options import TeleopOptions
-from syda_gym.envs.tracking import TERMS
+from syda_gym.envs.task.options import TeleopOptions
+from syda_gym.envs.task.tracking import TERMS
 
 __all__ = ["Solo"]
 

@@ -11,8 +11,8 @@ from gymnasium.spaces import Box
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.envs.fleet import EpisodeWish
-from syda_gym.envs.options import TeleopOptions
-from syda_gym.envs.repertoire import Repertoire
+from syda_gym.envs.task.options import TeleopOptions
+from syda_gym.envs.task.repertoire import Repertoire
 from syda_gym.errors import OptionError, nearest_name
 
 __all__ = ["RESET_OPTIONS", "action_from_command", "action_space", "one_info", "wishes"]

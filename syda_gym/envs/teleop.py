@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.envs.face import Face
-from syda_gym.envs.options import TeleopOptions
 from syda_gym.envs.rendering import Painter
 from syda_gym.envs.solo import Solo
 from syda_gym.envs.spaces import action_from_command, action_space, wishes
+from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.errors import OptionError, SydaError
-from syda_gym.simulation.camera import CameraView, Picture
-from syda_gym.simulation.window import has_display
+from syda_gym.simulation.pictures.camera import CameraView, Picture
+from syda_gym.simulation.pictures.window import has_display
 
 __all__ = ["SydaTeleopEnv"]
 
@@ -133,7 +133,7 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     ## Reward
 
     The sum of these terms, all of them in ``info["reward_terms"]``; weights in ``reward={...}``
-    (``syda_gym.envs.tracking.RewardWeights``):
+    (``syda_gym.envs.task.tracking.RewardWeights``):
 
     | term | formula | weight |
     |---|---|---|
@@ -195,8 +195,8 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
 
     ``reset(options=...)`` takes ``motion`` (name or index of a clip), ``frame`` and ``route``.
 
-    Disturbances are off by default; ``syda_gym.envs.disturbances`` lists the cells (``lag``, ``noise``, ``latency``,
-    ``noise+latency``, ``full``), the levels (``train``, ``test``, ``harsh``) and the single presets.
+    Disturbances are off by default; ``syda_gym.envs.task.disturbances`` lists the cells (``lag``, ``noise``,
+    ``latency``, ``noise+latency``, ``full``), the levels (``train``, ``test``, ``harsh``) and the single presets.
 
     ## Determinism
 

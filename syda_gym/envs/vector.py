@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.envs.face import Face
 from syda_gym.envs.fleet import EpisodeWish, Fleet
-from syda_gym.envs.options import TeleopOptions
 from syda_gym.envs.rendering import Painter
 from syda_gym.envs.spaces import action_from_command, action_space, one_info, wishes
+from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.errors import OptionError, SydaError, nearest_name
-from syda_gym.simulation.camera import CameraView, Picture
+from syda_gym.simulation.pictures.camera import CameraView, Picture
 
 __all__ = ["AUTORESET_MODES", "SydaTeleopVectorEnv"]
 

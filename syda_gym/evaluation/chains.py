@@ -196,7 +196,7 @@ class Links:
         return tuple(name for name in group if name in names)
 
     def _fit(self, source: str, target: str, groups: list[tuple[str, ...]], progress: Progress | None) -> list[Mapping]:
-        from syda_gym.mappings.fitting import fit_many
+        from syda_gym.mappings.fitting.fit import fit_many
 
         pair = self.pair(source, target)
         for group in groups:

@@ -69,7 +69,7 @@ def export_minari(
     import gymnasium
 
     from syda_gym import ENV_ID
-    from syda_gym.agents.classical import make_rival
+    from syda_gym.agents.classical.rivals import make_rival
     from syda_gym.agents.interface import Interface
 
     try:

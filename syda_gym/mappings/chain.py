@@ -127,3 +127,6 @@ def _gain(link: Mapping) -> float:
 
 def _joined(names: Iterable[str]) -> str:
     return "+".join(dict.fromkeys(names))
+
+
+Mapping.in_series = ChainMapping

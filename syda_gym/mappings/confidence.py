@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
-from syda_gym.mappings.scaling import Scaler
+from syda_gym.mappings.models.scaling import Scaler
 
 __all__ = ["Confidence", "action_maximum", "fit_confidence", "gain"]
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,9 +15,6 @@ from syda_gym.errors import MappingError
 from syda_gym.mappings.card import MappingCard
 from syda_gym.mappings.limits import limit_speed
 from syda_gym.motions.clip import PairedMotions
-
-if TYPE_CHECKING:
-    from syda_gym.mappings.chain import ChainMapping
 
 __all__ = ["Mapping", "map_clips"]
 
@@ -31,6 +29,8 @@ class Mapping(ABC):
         source: the body whose frames it takes.
         target: the body whose frames it gives.
     """
+
+    in_series: ClassVar[Callable[[tuple[Mapping, Mapping]], Mapping]]  # what ``>>`` makes; ``chain`` enters it here
 
     source: Embodiment
     target: Embodiment
@@ -136,13 +136,11 @@ class Mapping(ABC):
         mapped = self(np.atleast_2d(np.asarray(frames, dtype=np.float64)))
         return limit_speed(self.target, mapped, fps) if isinstance(self.target, Robot) else mapped
 
-    def __rshift__(self, after: Mapping) -> ChainMapping:
+    def __rshift__(self, after: Mapping) -> Mapping:
         """``a >> b``: the chain that applies ``a``, then ``b``."""
-        from syda_gym.mappings.chain import ChainMapping
-
         if not isinstance(after, Mapping):
             return NotImplemented
-        return ChainMapping((self, after))
+        return Mapping.in_series((self, after))
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({' > '.join(self.route)}, method={self.method!r}, preset={self.preset!r})"

@@ -14,14 +14,18 @@ from syda_gym.errors import StorageError, SydaError
 from syda_gym.files import atomic_path, fingerprint, read_json, write_json
 from syda_gym.mappings.card import MappingCard
 from syda_gym.mappings.chain import ChainMapping
-from syda_gym.mappings.coded import CodedMapping
-from syda_gym.mappings.coders import Coder
+from syda_gym.mappings.coded_mapping import CodedMapping
+from syda_gym.mappings.coding import arm_coders, mink_ik, window_coder
+from syda_gym.mappings.coding.coders import Coder, restore_coder
 from syda_gym.mappings.confidence import Confidence
 from syda_gym.mappings.mapping import Mapping
-from syda_gym.mappings.parts import restore_coder, restore_regressor
-from syda_gym.mappings.regressors import Regressor
+from syda_gym.mappings.models import heads, hop, linear, rotation
+from syda_gym.mappings.models.regressors import Regressor, restore_regressor
 
 __all__ = ["load_mapping", "save_mapping"]
+
+# Importing these enters their coders and models among those that can be rebuilt.
+_PARTS = (arm_coders, mink_ik, window_coder, heads, hop, linear, rotation)
 
 _MAX_BYTES = 256 * 2**20
 Arrays = dict[str, FloatArray]

@@ -11,7 +11,7 @@ import numpy as np
 
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
-from syda_gym.motions.picture import draw_clips
+from syda_gym.motions.stick_figures import draw_clips
 
 __all__ = ["BodyInfo", "MotionsInfo", "describe"]
 

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
-from syda_gym.errors import OptionError, nearest_name
 from syda_gym.simulation.rates import Rates
 
-__all__ = ["BACKENDS", "Backend", "MotorConditions", "make_world"]
+__all__ = ["BACKENDS", "Backend", "MotorConditions"]
 
 BACKENDS = ("bullet", "servo")
 """PyBullet, or the motor law in numpy."""
@@ -84,31 +83,3 @@ class Backend(Protocol):
 
     def close(self) -> None:
         """Releases what the world holds; harmless when repeated."""
-
-
-def make_world(
-    robot: Robot, rates: Rates, *, count: int = 1, physics: str = "bullet", self_collision: bool = False
-) -> Backend:
-    """Builds a world.
-
-    Args:
-        robot: the kind of robot.
-        rates: control and physics rate.
-        count: number of robots.
-        physics: one of ``BACKENDS``.
-        self_collision: whether a robot's links collide with each other (``bullet`` only).
-
-    Raises:
-        OptionError: unknown physics, or self-collision asked of a physics without contacts.
-    """
-    if physics not in BACKENDS:
-        raise OptionError(f"unknown physics {physics!r}; {nearest_name(str(physics), BACKENDS)}")
-    if physics == "servo":
-        if self_collision:
-            raise OptionError("physics='servo' knows no contacts; use physics='bullet' or self_collision=False")
-        from syda_gym.simulation.servo import ServoWorld
-
-        return ServoWorld(robot, rates, count)
-    from syda_gym.simulation.world import World
-
-    return World(robot, rates, count, self_collision=self_collision)

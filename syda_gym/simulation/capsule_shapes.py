@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from syda_gym.embodiments.arm_chain import ArmChain
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.kinematics.arm_chain import ArmChain
 from syda_gym.embodiments.robot import Robot
 
 __all__ = ["ArmCapsules", "BoxObstacle", "CapsuleObstacle", "Shapes", "read_shapes"]

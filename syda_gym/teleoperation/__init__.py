@@ -1,11 +1,11 @@
 """LIVE use: sources, the loop, sinks."""
 
 from syda_gym.teleoperation.calibration import Calibration, calibrate
+from syda_gym.teleoperation.incoming.sources import ReplaySource, Source, UdpSource, WebSocketSource
 from syda_gym.teleoperation.journal import Journal, replay_journal
+from syda_gym.teleoperation.live_run import run
 from syda_gym.teleoperation.loop import TeleoperationLoop
-from syda_gym.teleoperation.runner import run
-from syda_gym.teleoperation.sinks import ManySinks, MemorySink, Sink, UdpSink
-from syda_gym.teleoperation.sources import ReplaySource, Source, UdpSource, WebSocketSource
+from syda_gym.teleoperation.outgoing.sinks import ManySinks, MemorySink, Sink, UdpSink
 from syda_gym.teleoperation.tick import Decision, LoopSettings, State, Tick
 
 __all__ = [

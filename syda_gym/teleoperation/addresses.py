@@ -12,8 +12,8 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MotionError, OptionError, TeleoperationError, nearest_name
 from syda_gym.motions.clip import MotionClip
 from syda_gym.motions.loading import load_motions
-from syda_gym.teleoperation.sinks import ManySinks, MemorySink, Sink, UdpSink
-from syda_gym.teleoperation.sources import ReplaySource, Source, UdpSource, WebSocketSource
+from syda_gym.teleoperation.incoming.sources import ReplaySource, Source, UdpSource, WebSocketSource
+from syda_gym.teleoperation.outgoing.sinks import ManySinks, MemorySink, Sink, UdpSink
 
 __all__ = ["SINKS", "SOURCES", "make_sink", "make_source", "read_token"]
 
@@ -113,7 +113,7 @@ def read_token(path: str | os.PathLike[str] | None) -> str | None:
 
 
 def _sink(spec: str, robot: Robot, token: str | None, rate: float) -> Sink:
-    from syda_gym.teleoperation.bullet import BulletSink
+    from syda_gym.teleoperation.outgoing.bullet import BulletSink
 
     kind, _, rest = spec.partition(":")
     if kind == "none":
@@ -126,7 +126,7 @@ def _sink(spec: str, robot: Robot, token: str | None, rate: float) -> Sink:
         host, port = _host_and_port(rest, 9880)
         return UdpSink(robot, host, port, token)
     if kind == "naoqi":
-        from syda_gym.teleoperation.naoqi import NaoqiSink
+        from syda_gym.teleoperation.outgoing.naoqi import NaoqiSink
 
         return NaoqiSink(robot, rest or "tcp://127.0.0.1:9559")
     raise OptionError(f"unknown sink {spec!r}; {nearest_name(kind, SINKS)}")

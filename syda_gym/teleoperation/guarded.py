@@ -12,7 +12,7 @@ from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import SydaError, TeleoperationError
 from syda_gym.mappings.chain import ChainMapping
-from syda_gym.mappings.coded import CodedMapping
+from syda_gym.mappings.coded_mapping import CodedMapping
 from syda_gym.mappings.mapping import Mapping
 
 __all__ = ["GuardedMapping", "Mapped"]

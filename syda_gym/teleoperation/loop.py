@@ -11,15 +11,15 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import OptionError, SydaError, TeleoperationError, nearest_name
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.teleoperation.calibration import Calibration, Calibrator
-from syda_gym.teleoperation.confidence import ConfidencePolicy
-from syda_gym.teleoperation.filters import OneEuroFilter
-from syda_gym.teleoperation.frame_clock import FrameClock
 from syda_gym.teleoperation.guarded import GuardedMapping
-from syda_gym.teleoperation.homing import WayHome
-from syda_gym.teleoperation.limiter import CommandLimiter
-from syda_gym.teleoperation.self_collision import SelfCollision
+from syda_gym.teleoperation.incoming.frame_clock import FrameClock
+from syda_gym.teleoperation.safety.homing import WayHome
+from syda_gym.teleoperation.safety.limiter import CommandLimiter
+from syda_gym.teleoperation.safety.one_euro import OneEuroFilter
+from syda_gym.teleoperation.safety.self_collision import SelfCollision
+from syda_gym.teleoperation.safety.trust import ConfidencePolicy
+from syda_gym.teleoperation.safety.watchdog import Watch, Watchdog
 from syda_gym.teleoperation.tick import CONTROLS, Decision, LoopSettings, State, Tick
-from syda_gym.teleoperation.watchdog import Watch, Watchdog
 
 __all__ = ["TeleoperationLoop"]
 

@@ -10,10 +10,10 @@ import threading
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from syda_gym.teleoperation.inbox import Inbox
+from syda_gym.teleoperation.incoming.inbox import Inbox
+from syda_gym.teleoperation.incoming.sources import Source
+from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
-from syda_gym.teleoperation.sources import Source
-from syda_gym.teleoperation.statistics import LiveStatistics
 from syda_gym.teleoperation.tick import State
 
 if TYPE_CHECKING:

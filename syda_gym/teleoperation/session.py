@@ -12,12 +12,12 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import OptionError
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.teleoperation.addresses import make_sink, make_source
+from syda_gym.teleoperation.incoming.sources import Source
 from syda_gym.teleoperation.journal import Journal
+from syda_gym.teleoperation.live_run import run
+from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
-from syda_gym.teleoperation.runner import run
-from syda_gym.teleoperation.sinks import Sink
-from syda_gym.teleoperation.sources import Source
-from syda_gym.teleoperation.statistics import LiveStatistics
+from syda_gym.teleoperation.outgoing.sinks import Sink
 from syda_gym.teleoperation.tick import Decision, LoopSettings
 
 __all__ = ["Session", "teleoperate"]

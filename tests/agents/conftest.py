@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from syda_gym.agents.interface import Interface
-from syda_gym.agents.streams import Streams
+from syda_gym.agents.streams.streams import Streams
 from syda_gym.embodiments import catalog
-from syda_gym.motions.synthetic import generate
+from syda_gym.motions.synthetic.generator import generate
 from syda_gym.simulation.rates import Rates
 
 
@@ -66,6 +66,6 @@ def tiny_options():
 
 @pytest.fixture(scope="session")
 def ground(tiny_options):
-    from syda_gym.agents.recording import Ground
+    from syda_gym.agents.streams.ground import Ground
 
     return Ground(tiny_options)

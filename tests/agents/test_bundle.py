@@ -10,15 +10,14 @@ import pytest
 
 from syda_gym.agents.agent import BaseAlone
 from syda_gym.agents.bundle import load_agent, read_card, save_agent
-from syda_gym.agents.classical import Lead, make_rival
-from syda_gym.agents.predictor import Predictor
+from syda_gym.agents.classical.rivals import Lead, make_rival
+from syda_gym.agents.learned.predictor import Predictor
+from syda_gym.agents.learned.tcn import TcnShape
 from syda_gym.agents.stacks import build_stack, stack_spec
-from syda_gym.agents.streams import play_streams
-from syda_gym.agents.tcn import TcnShape
+from syda_gym.agents.streams.streams import play_streams
 from syda_gym.embodiments import catalog
 from syda_gym.errors import AgentError, StorageError
-
-from .test_residual import random_policy
+from tests.agents.residual.test_residual import random_policy
 
 
 def deep_stack(interface):

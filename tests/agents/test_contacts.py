@@ -11,15 +11,15 @@ import pytest
 import torch
 
 from syda_gym.agents.agent import BaseAlone
-from syda_gym.agents.avoidance import avoiding
-from syda_gym.agents.classical import make_rival
-from syda_gym.agents.contact_term import ContactTerm
+from syda_gym.agents.classical.avoidance import avoiding
+from syda_gym.agents.classical.projection import Projection, capsule_model
+from syda_gym.agents.classical.rivals import make_rival
 from syda_gym.agents.figures import Figures, jitter
-from syda_gym.agents.predictor_training import PredictorConfig, train_predictor
-from syda_gym.agents.projection import Projection, capsule_model
-from syda_gym.agents.streams import Streams, score_streams
+from syda_gym.agents.predictor.contact_term import ContactTerm
+from syda_gym.agents.predictor.predictor_training import PredictorConfig, train_predictor
+from syda_gym.agents.streams.streams import Streams, score_streams
 from syda_gym.errors import AgentError
-from syda_gym.motions.synthetic import generate
+from syda_gym.motions.synthetic.generator import generate
 
 
 @pytest.fixture(scope="module")

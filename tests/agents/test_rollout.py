@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from syda_gym.agents.agent import BaseAlone
-from syda_gym.agents.classical import make_rival
+from syda_gym.agents.classical.rivals import make_rival
 from syda_gym.agents.interface import Interface
-from syda_gym.agents.recording import Ground
 from syda_gym.agents.rollout import evaluate, mean_of
-from syda_gym.agents.streams import join, play_streams, read_stream
+from syda_gym.agents.streams.ground import Ground
+from syda_gym.agents.streams.streams import join, play_streams, read_stream
 from syda_gym.envs.fleet import EpisodeWish, Fleet
-from syda_gym.envs.options import TeleopOptions
 from syda_gym.envs.spaces import action_from_command
+from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.errors import AgentError
 
 

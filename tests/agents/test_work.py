@@ -8,12 +8,12 @@ from inspect import signature
 import pytest
 from typer.testing import CliRunner
 
-from syda_gym import cli_agents
-from syda_gym.agents.config import ResidualConfig
-from syda_gym.agents.predictor_training import PredictorConfig
-from syda_gym.agents.runner import find_mapping
+from syda_gym.agents.deployment.numpy_runner import find_mapping
+from syda_gym.agents.predictor.predictor_training import PredictorConfig
+from syda_gym.agents.residual.config import ResidualConfig
 from syda_gym.agents.work import compare_agents, export_bundle, find_agent, shipped_agents, train_agent, tune_rivals
-from syda_gym.cli import app
+from syda_gym.cli.main import agents as cli_agents
+from syda_gym.cli.main import app
 from syda_gym.errors import AgentError
 
 TINY = {"steps": 512, "robots": 8, "rollout": 32, "batch": 64, "epochs": 1, "legs": 1, "episodes": 4}
@@ -50,7 +50,7 @@ def test_a_bundle_is_found_compared_and_exported(trained, tiny_options, tmp_path
 
 
 def test_a_predictor_trains_by_the_same_function(tiny_options, tmp_path, monkeypatch):
-    from syda_gym.agents.recording import Ground
+    from syda_gym.agents.streams.ground import Ground
 
     record = Ground.record
     monkeypatch.setattr(Ground, "record", lambda self, episodes=None, **given: record(self, 4, **given))

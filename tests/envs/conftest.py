@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from syda_gym.motions.synthetic import generate
+from syda_gym.motions.synthetic.generator import generate
 
 
 @pytest.fixture(scope="session")

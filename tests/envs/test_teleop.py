@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import syda_gym
-from syda_gym.envs.options import TeleopOptions
+from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.envs.teleop import SydaTeleopEnv
 from syda_gym.errors import MappingError, OptionError, RouteError, SydaError
 
@@ -113,7 +113,7 @@ def test_another_process_gives_the_same_bits(cheap):
     code = (
         "import hashlib\n"
         "from tests.envs.test_teleop import flat, make, play\n"
-        "from syda_gym.motions.synthetic import generate\n"
+        "from syda_gym.motions.synthetic.generator import generate\n"
         "actions = ('wave_high', 'reach_high_front')\n"
         "m = generate(('adult', 'kid', 'pepper', 'nao'), seed=4, actions=actions, variants=2)\n"
         "cheap = {'motions': m, 'mapping': 'geometric', 'preset': 'fixed', 'route': ('adult', 'pepper')}\n"

@@ -9,7 +9,7 @@ from PIL import Image
 from syda_gym.errors import OptionError
 from syda_gym.evaluation.drawing import draw, write_png
 from syda_gym.evaluation.report.figures import Shape, Track, track
-from syda_gym.simulation.video import write_video
+from syda_gym.simulation.pictures.video import write_video
 
 
 def _ball(kind: str, size: tuple[float, ...], **place) -> Track:

@@ -10,7 +10,7 @@ import pytest
 from syda_gym.embodiments.embodiment import landmark_error
 from syda_gym.errors import OptionError, StorageError
 from syda_gym.evaluation.chains import Links
-from syda_gym.evaluation.demo import base_alone, run_demo
+from syda_gym.evaluation.demo.run import base_alone, run_demo
 from syda_gym.evaluation.episodes import figures_of, latency, make_env, play, play_all
 
 
@@ -119,8 +119,8 @@ def test_the_demo_runs_end_to_end(three_actions, tmp_path):
 
 
 def test_the_short_residual_begins_as_the_base_and_is_stored(three_actions, tmp_path):
-    from syda_gym.agents.config import ResidualConfig
-    from syda_gym.evaluation.demo_residual import train_and_compare
+    from syda_gym.agents.residual.config import ResidualConfig
+    from syda_gym.evaluation.demo.residual import train_and_compare
 
     held_out = (three_actions.takes[0].action,)
     links = Links(three_actions, "ridge", groups=[held_out])

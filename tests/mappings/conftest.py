@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from syda_gym.embodiments import HumanSkeleton, catalog
-from syda_gym.embodiments.limb_ik import LimbIK
+from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.embodiments.robot import Robot
 from syda_gym.motions.clip import PairedMotions
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from syda_gym.embodiments import landmark_error
-from syda_gym.mappings import fit, general
+from syda_gym.mappings import fit
 from syda_gym.mappings.confidence import action_maximum
-from syda_gym.mappings.fitting import fit_many
-
-from .conftest import make_pair
+from syda_gym.mappings.fitting.fit import fit_many
+from syda_gym.mappings.methods import general
+from tests.mappings.conftest import make_pair
 
 
 def test_the_bound_is_the_worst_action_s_own_quantile():

@@ -7,18 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from motions.recordings import json_text as to_json
-from motions.recordings import kinect_rows, mediapipe_json, table_lines, write_rows
 
 from syda_gym.embodiments import HumanSkeleton, catalog, landmark_error
-from syda_gym.embodiments.discovery import discover_robot
-from syda_gym.embodiments.limb_ik import LimbIK
+from syda_gym.embodiments.discovery.arms import discover_robot
+from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.embodiments.robot import Robot
 from syda_gym.mappings import fit
 from syda_gym.motions.clip import PairedMotions
 from syda_gym.motions.loading import load_motions
-
-from .conftest import _directions, human_frames, make_pair
+from tests.mappings.conftest import _directions, human_frames, make_pair
+from tests.motions.recordings import json_text as to_json
+from tests.motions.recordings import kinect_rows, mediapipe_json, table_lines, write_rows
 
 
 def spread(pair: PairedMotions) -> float:

@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from syda_gym.cli import app
+from syda_gym.cli.main import app
 from syda_gym.errors import MotionError
 from syda_gym.motions import FORMATS, generate, load_motions, write_dataset
-
-from . import recordings as rec
+from tests.motions import recordings as rec
 
 pytestmark = pytest.mark.filterwarnings("ignore::syda_gym.motions.readers.skeleton.MotionWarning")
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from syda_gym.embodiments import catalog
 from syda_gym.errors import EmbodimentError, OptionError
-from syda_gym.motions.synthetic import generate
+from syda_gym.motions.synthetic.generator import generate
 from syda_gym.simulation import MotorConditions, Rates, make_world
 from syda_gym.simulation.landmark_kinematics import LandmarkKinematics
 from syda_gym.simulation.world import World

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
-from syda_gym.embodiments.limb_ik import LimbIK
+from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.embodiments.robot import Robot
 from syda_gym.mappings.card import MappingCard
 from syda_gym.mappings.mapping import Mapping

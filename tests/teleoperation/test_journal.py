@@ -16,8 +16,7 @@ from syda_gym.errors import TeleoperationError
 from syda_gym.teleoperation.journal import Journal, read_journal, replay_journal
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.tick import LoopSettings, Tick
-
-from .conftest import LimbMapping
+from tests.teleoperation.conftest import LimbMapping
 
 Wave = Callable[[float], FloatArray]
 

@@ -18,16 +18,15 @@ from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, TeleoperationError
 from syda_gym.motions.clip import MotionClip
+from syda_gym.teleoperation.incoming.packets import encode_frame, encode_request
+from syda_gym.teleoperation.incoming.sources import ReplaySource, Source, UdpSource, WebSocketSource
 from syda_gym.teleoperation.journal import Journal, replay_journal
+from syda_gym.teleoperation.live_run import run
+from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
-from syda_gym.teleoperation.packets import encode_frame, encode_request
-from syda_gym.teleoperation.runner import run
-from syda_gym.teleoperation.sinks import ManySinks, MemorySink, UdpSink
-from syda_gym.teleoperation.sources import ReplaySource, Source, UdpSource, WebSocketSource
-from syda_gym.teleoperation.statistics import LiveStatistics
+from syda_gym.teleoperation.outgoing.sinks import ManySinks, MemorySink, UdpSink
 from syda_gym.teleoperation.tick import Decision, LoopSettings, State
-
-from .conftest import LimbMapping
+from tests.teleoperation.conftest import LimbMapping
 
 Wave = Callable[[float], FloatArray]
 

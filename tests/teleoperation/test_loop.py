@@ -14,8 +14,7 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MappingError, OptionError, TeleoperationError
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.tick import Decision, LoopSettings, State, Tick
-
-from .conftest import LimbMapping
+from tests.teleoperation.conftest import LimbMapping
 
 DT = 1 / 30
 Wave = Callable[[float], FloatArray]

@@ -14,17 +14,16 @@ from typer.testing import CliRunner
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MotionError, OptionError, TeleoperationError
+from syda_gym.routes.choice import choose_mapping
 from syda_gym.teleoperation.addresses import make_sink, make_source, read_token
-from syda_gym.teleoperation.bullet import BulletSink
-from syda_gym.teleoperation.choosing import choose_mapping
-from syda_gym.teleoperation.naoqi import NaoqiSink
+from syda_gym.teleoperation.incoming.sources import ReplaySource, UdpSource, WebSocketSource
+from syda_gym.teleoperation.live_statistics import LiveStatistics
+from syda_gym.teleoperation.outgoing.bullet import BulletSink
+from syda_gym.teleoperation.outgoing.naoqi import NaoqiSink
+from syda_gym.teleoperation.outgoing.sinks import ManySinks, MemorySink, UdpSink
 from syda_gym.teleoperation.session import Session, teleoperate
-from syda_gym.teleoperation.sinks import ManySinks, MemorySink, UdpSink
-from syda_gym.teleoperation.sources import ReplaySource, UdpSource, WebSocketSource
-from syda_gym.teleoperation.statistics import LiveStatistics
 from syda_gym.teleoperation.tick import Decision, LoopSettings, State
-
-from .conftest import LimbMapping
+from tests.teleoperation.conftest import LimbMapping
 
 
 def test_addresses_become_sources(adult: HumanSkeleton) -> None:
@@ -166,7 +165,7 @@ def test_statistics_stay_small_and_right() -> None:
 def test_keys_become_requests(monkeypatch: pytest.MonkeyPatch) -> None:
     import pty
 
-    from syda_gym.teleoperation.inbox import Inbox
+    from syda_gym.teleoperation.incoming.inbox import Inbox
     from syda_gym.teleoperation.screen import keyboard
 
     ours, theirs = pty.openpty()
@@ -189,7 +188,7 @@ def test_keys_become_requests(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_command_line_runs_journals_and_checks(tmp_path: Path) -> None:
-    from syda_gym.cli import app
+    from syda_gym.cli.main import app
 
     journal = tmp_path / "run.jsonl"
     common = ["teleop", "--mapping", "geometric"]
@@ -209,7 +208,7 @@ def test_the_command_line_runs_journals_and_checks(tmp_path: Path) -> None:
 
 
 def test_the_command_line_adds_shows_and_lists_robots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from syda_gym.cli import app
+    from syda_gym.cli.main import app
     from syda_gym.embodiments import catalog
     from syda_gym.files import asset
 
@@ -227,7 +226,7 @@ def test_the_command_line_adds_shows_and_lists_robots(tmp_path: Path, monkeypatc
 
 
 def test_the_command_line_records_a_pair(tmp_path: Path) -> None:
-    from syda_gym.cli import app
+    from syda_gym.cli.main import app
     from syda_gym.motions import read_dataset
 
     out = tmp_path / "pairs"

@@ -9,8 +9,8 @@ import torch
 from torch import Tensor, nn
 
 from syda_gym.agents.graphs.arithmetic import constant, cross
-from syda_gym.embodiments.arm_chain import ArmChain
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.kinematics.arm_chain import ArmChain
 
 __all__ = ["ArmKinematics"]
 

@@ -14,10 +14,10 @@ from syda_gym.agents.graphs.arm import ArmKinematics
 from syda_gym.agents.graphs.limbs import LimbGraph
 from syda_gym.agents.graphs.limits import robot_clamp
 from syda_gym.embodiments.embodiment import Side
-from syda_gym.embodiments.limb_ik import LimbIK
+from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.errors import AgentError
-from syda_gym.mappings.arm_coders import HUMAN_WIDTH, HumanArmCoder, RobotArmCoder
-from syda_gym.mappings.coders import Coder, PositionCoder, QuaternionCoder
+from syda_gym.mappings.coding.arm_coders import HUMAN_WIDTH, HumanArmCoder, RobotArmCoder
+from syda_gym.mappings.coding.coders import Coder, PositionCoder, QuaternionCoder
 
 __all__ = ["CODERS", "decoder_of", "encoder_of"]
 

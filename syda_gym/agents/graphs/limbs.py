@@ -11,8 +11,8 @@ from torch import Tensor, nn
 from syda_gym.agents.graphs.arithmetic import angle_of, constant, cosine, cross, dot, norm, wrapped
 from syda_gym.agents.graphs.arm import ArmKinematics
 from syda_gym.agents.graphs.limits import Clamp
-from syda_gym.embodiments.arm_chain import ArmChain
-from syda_gym.embodiments.limb_ik_single import EXACT, FLAT, STEPS, SingleArmIK
+from syda_gym.embodiments.kinematics.arm_chain import ArmChain
+from syda_gym.embodiments.limb_ik.single_arm import EXACT, FLAT, STEPS, SingleArmIK
 
 __all__ = ["LimbGraph"]
 

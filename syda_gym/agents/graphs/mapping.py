@@ -10,7 +10,7 @@ from syda_gym.agents.graphs.regressors import regressor_graph
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import AgentError
 from syda_gym.mappings.chain import ChainMapping
-from syda_gym.mappings.coded import CodedMapping
+from syda_gym.mappings.coded_mapping import CodedMapping
 from syda_gym.mappings.mapping import Mapping
 
 __all__ = ["MappingGraph"]

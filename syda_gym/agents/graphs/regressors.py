@@ -10,13 +10,13 @@ from torch import Tensor, nn
 
 from syda_gym.agents.graphs.arithmetic import constant
 from syda_gym.errors import AgentError
-from syda_gym.mappings.geometric import GeometricRegressor
-from syda_gym.mappings.heads import HeadedRegressor
-from syda_gym.mappings.linear import KernelRidge, Nearest, Ridge
-from syda_gym.mappings.networks import Stack
-from syda_gym.mappings.regressors import DirectRegressor, DualRegressor, Regressor
-from syda_gym.mappings.residual import HopRegressor, MeanRegressor, TwoWay
-from syda_gym.mappings.scaling import Scaler
+from syda_gym.mappings.models.heads import HeadedRegressor
+from syda_gym.mappings.models.hop import HopRegressor, MeanRegressor, TwoWay
+from syda_gym.mappings.models.linear import KernelRidge, Nearest, Ridge
+from syda_gym.mappings.models.networks import Stack
+from syda_gym.mappings.models.regressors import DirectRegressor, DualRegressor, Regressor
+from syda_gym.mappings.models.rotation import GeometricRegressor
+from syda_gym.mappings.models.scaling import Scaler
 
 __all__ = ["REGRESSORS", "regressor_graph"]
 

@@ -11,13 +11,13 @@ import torch
 from torch import Tensor, nn
 
 from syda_gym.agents.agent import Agent, BaseAlone
-from syda_gym.agents.classical import Ema, Kalman, Lead, OneEuro
+from syda_gym.agents.classical.rivals import Ema, Kalman, Lead, OneEuro
 from syda_gym.agents.graphs.arithmetic import constant
 from syda_gym.agents.graphs.limits import robot_clamp
 from syda_gym.agents.interface import Interface
-from syda_gym.agents.predictor import AGE_SCALE, GAP_SCALE, STEP_SCALE, Predictor
-from syda_gym.agents.residual import ResidualPolicy
-from syda_gym.agents.tcn import DILATIONS
+from syda_gym.agents.learned.policy import ResidualPolicy
+from syda_gym.agents.learned.predictor import AGE_SCALE, GAP_SCALE, STEP_SCALE, Predictor
+from syda_gym.agents.learned.tcn import DILATIONS
 from syda_gym.errors import AgentError
 
 __all__ = ["AgentGraph"]

@@ -11,7 +11,7 @@ from syda_gym.agents.graphs.arithmetic import constant
 from syda_gym.agents.graphs.limits import robot_clamp
 from syda_gym.agents.graphs.mapping import MappingGraph
 from syda_gym.agents.graphs.stack import AgentGraph
-from syda_gym.agents.runner import check_pairing
+from syda_gym.agents.pairing import check_pairing
 from syda_gym.errors import AgentError
 from syda_gym.mappings.mapping import Mapping
 

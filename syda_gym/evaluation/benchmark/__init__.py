@@ -2,8 +2,8 @@
 
 from syda_gym.evaluation.benchmark.compare import Comparison, compare
 from syda_gym.evaluation.benchmark.config import BenchmarkConfig, EfficiencyConfig
+from syda_gym.evaluation.benchmark.execution import run_benchmark
 from syda_gym.evaluation.benchmark.results import Results, read_results
-from syda_gym.evaluation.benchmark.runner import run_benchmark
 
 __all__ = [
     "BenchmarkConfig",

@@ -125,8 +125,8 @@ def data_fingerprint(motions: Motions) -> str:
 
 def _random(method: str, agent: str, disturbance: str) -> bool:
     """Whether the numbers of a cell depend on its seed."""
-    from syda_gym.agents.classical import RIVALS
-    from syda_gym.mappings.fitting import METHODS
+    from syda_gym.agents.classical.rivals import RIVALS
+    from syda_gym.mappings.fitting.fit import METHODS
 
     return METHODS[split_method(method)[0]].seeded or agent not in RIVALS or disturbance != "none"
 

@@ -100,8 +100,8 @@ class BenchmarkConfig:
     efficiency: EfficiencyConfig | None = None
 
     def __post_init__(self) -> None:
-        from syda_gym.envs.disturbances import Disturbances
-        from syda_gym.envs.options import TeleopOptions
+        from syda_gym.envs.task.disturbances import Disturbances
+        from syda_gym.envs.task.options import TeleopOptions
 
         for name in ("operators", "robots", "methods", "agents", "disturbances"):
             object.__setattr__(self, name, _names(name, getattr(self, name)))
@@ -209,7 +209,7 @@ def split_method(text: str) -> tuple[str, str | None]:
     Raises:
         OptionError: unknown method or preset.
     """
-    from syda_gym.mappings.fitting import METHODS
+    from syda_gym.mappings.fitting.fit import METHODS
 
     method, _, preset = text.partition(":")
     if method not in METHODS:
@@ -229,7 +229,7 @@ def _is_bundle(name: str) -> bool:
 
 
 def _check_agent(name: str) -> None:
-    from syda_gym.agents.classical import RIVALS
+    from syda_gym.agents.classical.rivals import RIVALS
 
     known = [*RIVALS, "residual"]
     if name in known or _is_bundle(name):

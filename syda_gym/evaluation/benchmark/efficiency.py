@@ -16,7 +16,7 @@ from syda_gym.errors import OptionError
 from syda_gym.evaluation.benchmark.results import Results
 from syda_gym.evaluation.report.model import Column, CurvePlot, Table
 from syda_gym.evaluation.statistics import Estimate, clustered_estimate
-from syda_gym.transferability.routing import models_chained, models_direct
+from syda_gym.routes.routing import models_chained, models_direct
 
 __all__ = ["EfficiencyCurve", "efficiency_curve", "models_plot"]
 

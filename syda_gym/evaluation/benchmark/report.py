@@ -226,7 +226,7 @@ def _edges(route: str) -> list[tuple[str, str]]:
 
 def _link_scores(episodes: Results, motions: Motions) -> Scores:
     """Transferability of every link that a chain uses; not a number where the metric knows a body not."""
-    from syda_gym.transferability.metric import transferability
+    from syda_gym.routes.metric import transferability
 
     scores: Scores = {}
     for route in dict.fromkeys(str(row["route"]) for row in episodes.rows):

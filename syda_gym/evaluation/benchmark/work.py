@@ -135,15 +135,15 @@ class Worker:
 
     def _agent(self, cell: Cell, settings: dict[str, Any], mapping: Mapping, group: Sequence[str], env: Any) -> Agent:
         from syda_gym.agents.bundle import load_agent
-        from syda_gym.agents.classical import RIVALS, make_rival
+        from syda_gym.agents.classical.rivals import RIVALS, make_rival
         from syda_gym.agents.interface import Interface
 
         if cell.agent in RIVALS:
             return make_rival(cell.agent, Interface.of(env))
         if cell.agent != "residual":
             return load_agent(cell.agent, env)
-        from syda_gym.agents.config import ResidualConfig
-        from syda_gym.agents.training import train_residual
+        from syda_gym.agents.residual.config import ResidualConfig
+        from syda_gym.agents.residual.residual_training import train_residual
 
         known = self._motions.pair(cell.route[0], cell.route[-1]).action_names
         training = [name for name in known if name not in group]
@@ -182,7 +182,7 @@ class Worker:
         self, cell: Cell, links: Links, edge: tuple[str, str], groups: list[tuple[str, ...]], settings: dict[str, Any]
     ) -> list[Mapping]:
         """The new body's link for every fold, fitted on ``cell.actions`` of the actions that remain."""
-        from syda_gym.mappings.fitting import fit_many
+        from syda_gym.mappings.fitting.fit import fit_many
 
         pair = links.pair(*edge)
         training = []

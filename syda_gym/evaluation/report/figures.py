@@ -137,7 +137,7 @@ class _RobotModel:
     def __init__(self, robot: Robot) -> None:
         import yourdfpy
 
-        from syda_gym.embodiments.urdf import read_urdf
+        from syda_gym.embodiments.kinematics.urdf import read_urdf
 
         self._robot = robot
         self._model = read_urdf(robot.urdf).model

@@ -1,0 +1,1 @@
+"""Agents that are formulas: filters, lead, projection, and the tuning of their few numbers."""

@@ -1,0 +1,1 @@
+"""How the predictor is taught: by regression through the servo, on recorded streams."""

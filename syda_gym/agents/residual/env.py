@@ -1,0 +1,218 @@
+"""ResidualVecEnv: what Stable-Baselines3 trains a residual policy on: recorded streams, servo model, shadow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+
+from syda_gym.agents.agent import Agent, limited
+from syda_gym.agents.classical.projection import capsule_model
+from syda_gym.agents.interface import Reading
+from syda_gym.agents.learned.policy import feature_count, policy_features
+from syda_gym.agents.residual.costs import CostWeights
+from syda_gym.agents.streams.streams import Streams, read_rows
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.simulation.making import make_world
+from syda_gym.simulation.rates import Rates
+
+__all__ = ["ResidualVecEnv"]
+
+_DEEPEST = 4.0  # margins of overlap beyond which a contact costs no more
+
+
+class ResidualVecEnv(VecEnv):  # type: ignore[misc]
+    """``B`` robots replay streams under a base agent plus a correction; ``B`` shadows do so without the correction.
+
+    The reward is the cost that the correction saves against the shadow in the same step, so that its mean says at once
+    whether the policy helps. Actions are corrections in [-1, 1], low-passed and scaled as ``ResidualPolicy`` does it;
+    observations are the features of ``ResidualPolicy``, normalised. An episode ends with its clip, which is truncation.
+
+    Args:
+        base: the agent below; a second copy of it drives the shadows.
+        shadow: that copy; must be another object.
+        streams: what is replayed.
+        rates: control and physics rate.
+        count: number of robots.
+        scale: largest correction [rad].
+        smoothing: share of the old correction.
+        weights: of the cost.
+        mean: of the features; zeros until ``normalise``.
+        std: of the features; ones until ``normalise``.
+    """
+
+    def __init__(
+        self,
+        base: Agent,
+        shadow: Agent,
+        streams: Streams,
+        rates: Rates,
+        *,
+        count: int,
+        scale: float,
+        smoothing: float,
+        weights: CostWeights,
+        mean: FloatArray | None = None,
+        std: FloatArray | None = None,
+    ) -> None:
+        self.interface = base.interface
+        features, n = feature_count(self.interface), self.interface.n
+        self.render_mode = None
+        super().__init__(
+            count,
+            gymnasium.spaces.Box(-10.0, 10.0, (features,), dtype=np.float32),
+            gymnasium.spaces.Box(-1.0, 1.0, (n,), dtype=np.float32),
+        )
+        self.agents = (base, shadow)
+        self.streams, self.rates = streams, rates
+        self.scale, self.smoothing, self.weights = scale, smoothing, weights
+        self.mean = np.zeros(features) if mean is None else mean
+        self.std = np.ones(features) if std is None else std
+        # Learners and shadows live in one world: rows [0, B) and [B, 2B).
+        self.world = make_world(self.interface.robot, rates, count=2 * count, physics="servo")
+        self._capsules = capsule_model(self.interface.robot) if weights.contact else None
+        robot, shape = self.interface.robot, streams.reference.shape
+        self._targets = robot.landmarks(streams.reference.reshape(-1, n)).reshape(*shape[:2], -1, 3)
+        self._actions = np.zeros((count, n))
+        self.raw_features = np.zeros((count, features))
+        self._episode: NDArray[np.int64] = np.zeros(count, dtype=np.int64)
+        self._step: NDArray[np.int64] = np.zeros(count, dtype=np.int64)
+        self._correction: FloatArray = np.zeros((count, n))
+        self._below: FloatArray = np.zeros((count, n))
+        self._shadow_below: FloatArray = np.zeros((count, n))
+        self._trail: FloatArray = np.zeros((4, 2 * count, self._targets.shape[2], 3))
+        self.rng = np.random.default_rng(0)
+
+        self._begin_all()
+
+    def seed_all(self, seed: int | Sequence[int]) -> None:
+        """Sets the random numbers that choose episodes; takes effect at the next ``reset``."""
+        self.rng = np.random.default_rng(seed)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begins all episodes anew, each at a random step so that they do not end together."""
+        self._begin_all()
+        steps = (self.rng.random(self.num_envs) * (self.streams.lengths[self._episode] - 10)).astype(np.intp)
+        self._start(np.arange(self.num_envs), steps)
+        return self._observe()
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Takes the actions ``(B, n)`` of the next step."""
+        self._actions = np.clip(np.asarray(actions, dtype=np.float64), -1.0, 1.0)
+
+    def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """One control step of learners and shadows."""
+        count, n = self.num_envs, self.interface.n
+        self._correction = self.smoothing * self._correction + (1.0 - self.smoothing) * self._actions
+        below = self._below
+        command = limited(self.interface, below + self.scale * self._correction, below, self.world.pose[:count, :n])
+        self.world.advance(np.concatenate([command, self._shadow_below]))
+        cost = self._cost()
+        reward = (cost[count:] - cost[:count]) / self.weights.scale
+        self._step = self._step + 1
+        done = self._step >= self.streams.lengths[self._episode]
+        infos: list[dict[str, Any]] = [{} for _ in range(count)]
+        if done.any():
+            self._finish(done, infos)
+        return self._observe(), reward.astype(np.float32), done, infos
+
+    def close(self) -> None:
+        """Releases the world."""
+        self.world.close()
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """No robot is wrapped."""
+        return [False] * self.num_envs
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """The same attribute for every robot."""
+        return [getattr(self, attr_name)] * self.num_envs
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Sets an attribute that all robots share."""
+        setattr(self, attr_name, value)
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Calls a method that all robots share."""
+        return [getattr(self, method_name)(*args, **kwargs)] * self.num_envs
+
+    def _begin_all(self) -> None:
+        """All robots at the start of some episode, all agents without history."""
+        count, n = self.num_envs, self.interface.n
+        for agent in self.agents:
+            agent.reset(count)
+        self._episode = np.asarray(self.rng.integers(len(self.streams), size=count))
+        self._step = np.zeros(count, dtype=np.intp)
+        self._correction = np.zeros((count, n))
+
+    def _start(self, rows: NDArray[np.intp], steps: NDArray[np.intp]) -> None:
+        """Puts learners ``rows`` and their shadows at rest at a step of their episodes."""
+        count = self.num_envs
+        self._step[rows] = steps
+        self._correction[rows] = 0.0
+        both = np.concatenate([rows, rows + count])
+        start = self.streams.base[self._episode[rows], steps]
+        if self.streams.motors:
+            for row in rows.tolist():
+                for robot in (row, row + count):
+                    self.world.set_conditions(robot, self.streams.motors[self._episode[row]])
+        self.world.reset(both, np.concatenate([start, start]))
+        self._trail[:, both] = self._landmarks()[both]
+
+    def _finish(self, done: NDArray[np.bool_], infos: list[dict[str, Any]]) -> None:
+        """Ends episodes: what was seen last goes to ``infos``, and the next ones begin."""
+        rows = np.flatnonzero(done)
+        learner, _ = self._readings()
+        # The base agent must not be asked twice in one step, so that the raw base command stands in for its answer.
+        last = self._normalised(policy_features(self.interface, learner.base, self._correction, learner))
+        for row in rows.tolist():
+            infos[row] = {"terminal_observation": last[row], "TimeLimit.truncated": True}
+        self._episode[rows] = self.rng.integers(len(self.streams), size=len(rows))
+        self._start(rows, np.zeros(len(rows), dtype=np.intp))
+        for agent in self.agents:
+            agent.restart(done)
+
+    def _observe(self) -> NDArray[np.float32]:
+        """Asks both agents for their commands and returns the learners' features."""
+        learner, shadow = self._readings()
+        self._below = self.agents[0].act_on(learner)
+        self._shadow_below = self.agents[1].act_on(shadow)
+        self.raw_features = policy_features(self.interface, self._below, self._correction, learner)
+        return self._normalised(self.raw_features)
+
+    def _normalised(self, features: FloatArray) -> NDArray[np.float32]:
+        return np.clip((features - self.mean) / self.std, -10.0, 10.0).astype(np.float32)
+
+    def _readings(self) -> tuple[Reading, Reading]:
+        """What learners and shadows read."""
+        count, n = self.num_envs, self.interface.n
+        q, qd = self.world.pose[:, :n], self.world.qd
+        learner, shadow = (
+            read_rows(self.interface, self.streams, self._episode, self._step, q[part], qd[part])
+            for part in (slice(0, count), slice(count, None))
+        )
+        return learner, shadow
+
+    def _landmarks(self) -> FloatArray:
+        n = self.interface.n
+        return np.asarray(self.world.pose[:, n:].reshape(2 * self.num_envs, -1, 3))
+
+    def _cost(self) -> FloatArray:
+        """Cost of the step just made, learners first, ``(2 B,)``."""
+        weights, n = self.weights, self.interface.n
+        episode, step = np.tile(self._episode, 2), np.tile(self._step, 2)
+        points, q = self._landmarks(), self.world.pose[:, :n]
+        self._trail = np.concatenate([self._trail[1:], points[None]])
+        third = self._trail[3] - 3.0 * self._trail[2] + 3.0 * self._trail[1] - self._trail[0]
+        landmark = np.linalg.norm(points - self._targets[episode, step], axis=-1).mean(axis=-1)
+        joint = np.abs(q - self.streams.reference[episode, step]).mean(axis=-1)
+        jitter = np.linalg.norm(third, axis=-1).mean(axis=-1)
+        cost = 1e3 * (landmark + weights.joints * joint + weights.jitter * jitter)
+        if self._capsules is not None:
+            depth = 1.0 - self._capsules.clearance(q) / weights.margin
+            cost = cost + weights.contact * np.clip(depth, 0.0, _DEEPEST)
+        return np.asarray(cost)

@@ -1,0 +1,210 @@
+"""Streams: base commands over time, as an environment would show them, kept to tune and teach agents fast.
+
+What the operator does, and what noise, latency and packet loss make of it, does not depend on the robot. So the base
+command, its packet's age and the reference of an episode can be recorded once and then played with any agent in the
+servo model without the environment around it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syda_gym.agents.agent import Agent
+from syda_gym.agents.figures import Figures, figures_of_points, mean_figures
+from syda_gym.agents.interface import Interface, Reading
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.robot import Robot
+from syda_gym.errors import AgentError
+from syda_gym.simulation.backend import MotorConditions
+from syda_gym.simulation.capsules import CapsuleModel
+from syda_gym.simulation.making import make_world
+from syda_gym.simulation.rates import Rates
+
+__all__ = ["Streams", "join", "play_streams", "score_streams"]
+
+
+@dataclass(frozen=True, eq=False)
+class Streams:
+    """``E`` episodes of up to ``T`` control steps.
+
+    Attributes:
+        base: base command ``(E, T, n)`` [rad]; after the end of an episode its last command is repeated.
+        age: of the packet ``(E, T)`` [s].
+        reference: where the joints should be after the step ``(E, T, n)`` [rad].
+        lengths: control steps of each episode ``(E,)``.
+        motors: how each robot differs from the nominal one; nominal if empty.
+        names: of each episode, for tables.
+        operator: newest operator frame at hand ``(E, T, F)``; only needed where an agent reads whole observations.
+    """
+
+    base: FloatArray
+    age: FloatArray
+    reference: FloatArray
+    lengths: NDArray[np.int64]
+    motors: tuple[MotorConditions, ...] = ()
+    names: tuple[str, ...] = field(default=())
+    operator: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        episodes, steps = self.base.shape[:2]
+        if self.reference.shape != self.base.shape or self.age.shape != (episodes, steps):
+            raise AgentError(
+                f"streams need base and reference (E, T, n) and age (E, T), got {self.base.shape}, "
+                f"{self.reference.shape} and {self.age.shape}"
+            )
+        if self.lengths.shape != (episodes,) or (self.lengths < 4).any() or (self.lengths > steps).any():
+            raise AgentError("streams need one length per episode, at least 4 and at most T")
+        if self.motors and len(self.motors) != episodes:
+            raise AgentError(f"{len(self.motors)} motor conditions for {episodes} episodes; give one each or none")
+
+    def __len__(self) -> int:
+        return len(self.base)
+
+    def rows(self, which: Sequence[int] | NDArray[np.intp]) -> Streams:
+        """Some of the episodes."""
+        index = np.asarray(which, dtype=np.intp)
+        return Streams(
+            self.base[index],
+            self.age[index],
+            self.reference[index],
+            self.lengths[index],
+            tuple(self.motors[i] for i in index) if self.motors else (),
+            tuple(self.names[i] for i in index) if self.names else (),
+            None if self.operator is None else self.operator[index],
+        )
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """Which steps belong to their episode ``(E, T)``."""
+        return np.arange(self.base.shape[1])[None] < self.lengths[:, None]
+
+
+def join(parts: Sequence[Streams]) -> Streams:
+    """All episodes of several streams, padded to the longest by repeating the last step."""
+    steps = max(part.base.shape[1] for part in parts)
+
+    def padded(array: FloatArray | None) -> FloatArray:
+        assert array is not None
+        return np.concatenate([array, np.repeat(array[:, -1:], steps - array.shape[1], axis=1)], axis=1)
+
+    with_motors = any(part.motors for part in parts)
+    return Streams(
+        np.concatenate([padded(part.base) for part in parts]),
+        np.concatenate([padded(part.age) for part in parts]),
+        np.concatenate([padded(part.reference) for part in parts]),
+        np.concatenate([part.lengths for part in parts]),
+        tuple(m for p in parts for m in (p.motors or (MotorConditions(),) * len(p))) if with_motors else (),
+        tuple(name for part in parts for name in (part.names or ("",) * len(part))),
+        None if any(p.operator is None for p in parts) else np.concatenate([padded(p.operator) for p in parts]),
+    )
+
+
+def play_streams(agent: Agent, streams: Streams, rates: Rates) -> FloatArray:
+    """Plays an agent in the servo model.
+
+    Args:
+        agent: who acts; it is reset first.
+        streams: what it sees.
+        rates: control and physics rate; must be those of the agent's interface.
+
+    Returns:
+        Joint angles after each step ``(E, T, n)`` [rad]. Robots begin at rest at their first base command.
+
+    Raises:
+        AgentError: the rates are not those that the agent is made for.
+    """
+    interface = agent.interface
+    if abs(rates.dt - interface.dt) > 1e-9 or abs(rates.lag_share - interface.alpha) > 1e-9:
+        raise AgentError(f"the agent is made for dt={interface.dt}, alpha={interface.alpha}; got {rates}")
+    episodes, steps = streams.base.shape[:2]
+    world = make_world(interface.robot, rates, count=episodes, physics="servo")
+    for index, motors in enumerate(streams.motors):
+        world.set_conditions(index, motors)
+    world.reset(np.arange(episodes, dtype=np.intp), streams.base[:, 0])
+    agent.reset(episodes)
+    result = np.empty_like(streams.base)
+    n = interface.n
+    for t in range(steps):
+        command = agent.act_on(read_stream(interface, streams, t, world.pose[:, :n], world.qd))
+        world.advance(command)
+        result[:, t] = world.pose[:, :n]
+    world.close()
+    return result
+
+
+def read_stream(interface: Interface, streams: Streams, t: int, q: FloatArray, qd: FloatArray) -> Reading:
+    """The reading of step ``t`` of every episode, with the observation that the environment would show.
+
+    Blocks that a stream does not hold (a preview, histories, the previous action) are zero.
+    """
+    rows = np.arange(len(streams))
+    return read_rows(interface, streams, rows, np.full(len(rows), t), q, qd)
+
+
+def read_rows(
+    interface: Interface,
+    streams: Streams,
+    episodes: NDArray[np.integer[Any]],
+    steps: NDArray[np.integer[Any]],
+    q: FloatArray,
+    qd: FloatArray,
+) -> Reading:
+    """The reading of step ``steps[i]`` of episode ``episodes[i]`` for robots ``i`` at ``q`` ``(B, n)``."""
+    base, age = streams.base[episodes, steps], streams.age[episodes, steps]
+    layout = interface.layout
+    observation = np.zeros((len(q), interface.size))
+    error = layout["base_error"].start
+    observation[:, error : error + interface.n] = base - q
+    observation[:, layout["q"]], observation[:, layout["qd"]] = q, qd
+    observation[:, layout["packet_age"].start] = age
+    if streams.operator is not None and "operator" in layout:
+        observation[:, layout["operator"]] = streams.operator[episodes, steps]
+    return Reading(base=base, preview=base[:, None], q=q, qd=qd, age=age, observation=observation)
+
+
+def score_streams(
+    agent: Agent, streams: Streams, rates: Rates, *, skip: int = 0, capsules: CapsuleModel | None = None
+) -> Figures:
+    """Mean figures of an agent over all episodes.
+
+    Args:
+        agent: who acts.
+        streams: what it sees.
+        rates: control and physics rate.
+        skip: steps at the start of each episode that are left out.
+        capsules: counts steps with a contact; none are counted if left out.
+    """
+    return mean_figures(stream_figures(agent, streams, rates, skip=skip, capsules=capsules))
+
+
+def stream_figures(
+    agent: Agent, streams: Streams, rates: Rates, *, skip: int = 0, capsules: CapsuleModel | None = None
+) -> list[Figures]:
+    """Figures of every episode."""
+    q = play_streams(agent, streams, rates)
+    robot = agent.interface.robot
+
+    def touching(e: int, length: int) -> NDArray[np.bool_] | None:
+        return None if capsules is None else capsules.clearance(q[e, skip:length]) < 0.0
+
+    points, targets = _landmarks(robot, q), _landmarks(robot, streams.reference)
+    return [
+        figures_of_points(
+            q[e, skip:length],
+            streams.reference[e, skip:length],
+            points[e, skip:length],
+            targets[e, skip:length],
+            touching(e, length),
+        )
+        for e, length in enumerate(streams.lengths.tolist())
+    ]
+
+
+def _landmarks(robot: Robot, q: FloatArray) -> FloatArray:
+    """Landmarks ``(E, T, P, 3)`` of joint angles ``(E, T, n)``, all at once: a call costs more than its rows."""
+    return robot.landmarks(q.reshape(-1, q.shape[-1])).reshape(*q.shape[:2], -1, 3)

@@ -1,0 +1,307 @@
+"""The commands that deal with the user's own robot: ``robot``, ``teleop`` and ``record``; registered by ``cli``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from syda_gym.cli.shared import console
+
+if TYPE_CHECKING:
+    from syda_gym.embodiments.robot import Robot
+    from syda_gym.teleoperation.session import Session
+
+__all__ = ["record", "robot_app", "teleop"]
+
+robot_app = typer.Typer(help="Add your own robot, look at it, list those that are known.", no_args_is_help=True)
+
+OperatorOption = Annotated[str, typer.Option(help="Who leads: a body's name.")]
+TokenOption = Annotated[
+    Path | None, typer.Option("--token-file", help="File with the secret that packets carry beyond this machine.")
+]
+AxesOption = Annotated[str, typer.Option(help="The source's axes: `kinect`, `ros` or `camera`.")]
+NoCalibrationOption = Annotated[float, typer.Option(help="Seconds of standing; 0 trusts the source.", min=0.0)]
+
+
+@robot_app.command("add")
+def _robot_add(
+    urdf: Annotated[Path, typer.Argument(help="Any URDF, with primitives or meshes.")],
+    name: Annotated[str | None, typer.Option(help="The new name; by default the file's.")] = None,
+    left: Annotated[str | None, typer.Option(help="Link at the end of the left arm, if the search is wrong.")] = None,
+    right: Annotated[str | None, typer.Option(help="Link at the end of the right arm.")] = None,
+    torso: Annotated[str | None, typer.Option(help="Link in whose frame landmarks are expressed.")] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="Overwrite a robot that was added before.")] = False,
+    suggest: Annotated[bool, typer.Option(help="Say which pair to record next.")] = True,
+) -> None:
+    """Find arms, hands and torso of a URDF, propose landmarks and a rest pose, and make it known by name."""
+    import math
+
+    from syda_gym.teleoperation.setup.robot_setup import add_robot
+
+    added = add_robot(urdf, name, left=left, right=right, torso=torso, replace_existing=replace)
+    _print_robot(added.robot)
+    say = console()
+    degrees = math.degrees(added.pointing_error)
+    say.print(
+        f"it points its limbs as a person does within {degrees:.1f} degrees on average (poses in front and beside)"
+    )
+    for notice in added.notices:
+        say.print(f"- {notice}", markup=False)
+    say.print(f"description: [bold]{added.description}[/] (edit it if something is wrong)", soft_wrap=True)
+    say.print(f"picture: [bold]{added.picture}[/] (the coloured arms must lie on the robot's)", soft_wrap=True)
+    say.print(
+        f"try it: syda-gym teleop --robot {added.robot.name} --mapping geometric --sink video:{added.robot.name}.mp4"
+    )
+    if suggest:
+        from syda_gym.routes.suggestion import suggest as rank
+
+        bodies = ["adult", "kid", "pepper", added.robot.name]
+        known = [("adult", "kid"), ("kid", "pepper"), ("adult", "pepper")]
+        people = {"adult", "kid"}  # a recording session pairs a person with a robot
+        pairs = [choice.pair for choice in rank(bodies, known, samples=2**16) if people & set(choice.pair)]
+        best = next(pair for pair in pairs if added.robot.name in pair)
+        say.print(f"record next: {best[0]} with {best[1]} (of the pairs with a person it connects most)")
+
+
+@robot_app.command("show")
+def _robot_show(
+    name: Annotated[str, typer.Argument(help="A robot's name, or the path of its description.")],
+    picture: Annotated[Path | None, typer.Option(help="PNG to draw it into.")] = None,
+) -> None:
+    """Show what is known about a robot; draws its picture anew after you have edited its description."""
+    from syda_gym.embodiments import catalog
+    from syda_gym.embodiments.robot import Robot
+    from syda_gym.errors import EmbodimentError
+    from syda_gym.teleoperation.setup.robot_picture import draw_robot
+
+    body = catalog.resolve(name)
+    if not isinstance(body, Robot):
+        raise EmbodimentError(f"{name!r} is a {body.kind}; robots can be shown")
+    _print_robot(body)
+    drawn = draw_robot(body, picture or catalog.user_folder() / f"{body.name}.png")
+    console().print(f"picture: [bold]{drawn}[/]", soft_wrap=True)
+
+
+@robot_app.command("list")
+def _robot_list() -> None:
+    """List the robots that every command takes by name."""
+    from rich.table import Table
+
+    from syda_gym.embodiments import catalog
+    from syda_gym.embodiments.robot import Robot
+    from syda_gym.errors import SydaError
+
+    table = Table("name", "arms", "joints", "reach \\[m]", "URDF")
+    for name in catalog.names():
+        try:
+            body = catalog.get(name)
+        except SydaError as error:
+            table.add_row(name, "", "", "", f"[red]{error}[/]")
+            continue
+        if isinstance(body, Robot):
+            table.add_row(name, "+".join(body.sides), str(body.n_features), f"{body.reach:.3f}", str(body.urdf))
+    console().print(table)
+
+
+def teleop(
+    operator: OperatorOption = "adult",
+    robot: Annotated[str, typer.Option(help="Who follows: a robot's name.")] = "pepper",
+    source: Annotated[
+        str, typer.Option(help="`replay:SPEC`, `udp:PORT`, `udp:HOST:PORT` or `ws:PORT`.")
+    ] = "replay:embedded",
+    sink: Annotated[
+        list[str] | None,
+        typer.Option(help="`bullet`, `window`, `video:FILE.mp4`, `udp:HOST:PORT`, `naoqi:URL` or `none`; repeatable."),
+    ] = None,
+    mapping: Annotated[
+        str, typer.Option(help="A method, `geometric` (needs no recordings), a stored mapping, or a folder of them.")
+    ] = "syda",
+    preset: Annotated[str | None, typer.Option(help="Preset of the method.")] = None,
+    route: Annotated[str, typer.Option(help="`auto`, or bodies such as `adult,kid,pepper`.")] = "auto",
+    motions: Annotated[str, typer.Option("--motions", "-m", help="What is fitted on.", metavar="SPEC")] = "embedded",
+    action: Annotated[list[str] | None, typer.Option(help="Action that a replay plays; repeatable.")] = None,
+    speed: Annotated[float, typer.Option(help="Speed of a replay.")] = 1.0,
+    repeat: Annotated[bool, typer.Option("--repeat", help="A replay begins again at its end.")] = False,
+    calibration: NoCalibrationOption = 2.0,
+    axes: AxesOption = "kinect",
+    rate: Annotated[float, typer.Option(help="Commands per second while no frame comes.")] = 30.0,
+    limit: Annotated[float, typer.Option(help="Share of the joints' speed limits that may be used.")] = 1.0,
+    bound_slow: Annotated[float | None, typer.Option(help="Error bound [m] from which the robot slows.")] = None,
+    bound_hold: Annotated[float | None, typer.Option(help="Error bound [m] from which it holds.")] = None,
+    token_file: TokenOption = None,
+    origin: Annotated[list[str] | None, typer.Option(help="Web page that may connect to a WebSocket.")] = None,
+    journal: Annotated[Path | None, typer.Option(help="Write every decision to this `.jsonl` or `.jsonl.gz`.")] = None,
+    replay_journal: Annotated[
+        Path | None, typer.Option("--check-journal", help="Decide a journal anew and compare, instead of a live run.")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(help="End after this time.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of fits.", min=0)] = 0,
+) -> None:
+    """Drive a robot live: calibrate, map, filter, keep to limits and speeds, avoid self-collision, send."""
+    from syda_gym.routes.choice import choose_mapping
+    from syda_gym.teleoperation.addresses import read_token
+    from syda_gym.teleoperation.journal import replay_journal as decide_anew
+    from syda_gym.teleoperation.session import teleoperate
+    from syda_gym.teleoperation.tick import LoopSettings
+
+    say = console()
+    with say.status("choosing or fitting the mapping"):
+        chosen, notices = choose_mapping(
+            operator,
+            robot,
+            mapping=mapping,
+            preset=preset,
+            route=route if route == "auto" else tuple(route.split(",")),
+            motions=motions,
+            seed=seed,
+        )
+    for notice in notices:
+        say.print(f"- {notice}", markup=False)
+    if replay_journal is not None:
+        report = decide_anew(replay_journal, chosen)
+        where = "" if report.exact else f"; the first other one is in line {report.first_difference}"
+        say.print(f"{report.same} of {report.ticks} decisions are the same, bit for bit{where}")
+        raise typer.Exit(code=0 if report.exact else 1)
+    settings = LoopSettings(
+        rate=rate, calibration=calibration, axes=axes, speed=limit, bound_slow=bound_slow, bound_hold=bound_hold
+    )
+    _end_gently()
+    with _Screen() as screen:
+        stats = teleoperate(
+            chosen,
+            source,
+            sink or ["bullet"],
+            settings=settings,
+            token=read_token(token_file),
+            speed=speed,
+            actions=action or (),
+            repeat=repeat,
+            origins=tuple(origin or ()),
+            journal=journal,
+            note={"mapping": mapping, "motions": motions, "route": route, "source": source},
+            seconds=seconds,
+            on_start=screen.start,
+            on_decision=screen.update,
+        )
+    summary = stats.summary()
+    say.print(
+        f"{summary['commands']} commands for {summary['frames']} frames; latency median "
+        f"{summary['latency_p50_ms']:.2f} ms, 99 % {summary['latency_p99_ms']:.2f} ms; states {summary['states']}"
+    )
+    if journal is not None:
+        say.print(f"journal: [bold]{journal}[/]", soft_wrap=True)
+
+
+def record(
+    out: Annotated[Path, typer.Argument(help="Folder of the new data set.")],
+    operator: OperatorOption = "adult",
+    robot: Annotated[str, typer.Option(help="Who plays the prompts: a robot's name.")] = "pepper",
+    prompts: Annotated[str, typer.Option(help="Motions of the robot to play.", metavar="SPEC")] = "embedded",
+    action: Annotated[
+        list[str] | None, typer.Option(help="Action to play; repeatable. Default: one take of each.")
+    ] = None,
+    takes: Annotated[int, typer.Option(help="Takes per action.", min=1)] = 1,
+    source: Annotated[str, typer.Option(help="Where the person's frames come from; see `teleop`.")] = "udp:9870",
+    sink: Annotated[list[str] | None, typer.Option(help="What shows the robot to the person; see `teleop`.")] = None,
+    calibration: NoCalibrationOption = 2.0,
+    axes: AxesOption = "kinect",
+    countdown: Annotated[float, typer.Option(help="Seconds in the first pose of each prompt.")] = 2.0,
+    token_file: TokenOption = None,
+) -> None:
+    """Record a pair: the robot plays prompts, a person mimics it, and a data set for `fit` comes out."""
+    from rich.table import Table
+
+    from syda_gym.motions import write_dataset
+    from syda_gym.teleoperation.addresses import make_sink, make_source, read_token
+    from syda_gym.teleoperation.setup.record_session import RecordingOptions, choose_prompts, record_session
+
+    say = console()
+    clips, leader = choose_prompts(prompts, robot, operator, actions=action or (), takes=takes)
+    token = read_token(token_file)
+    listener = make_source(source, leader, token=token, calibration=calibration)
+    options = RecordingOptions(calibration=calibration, axes=axes, countdown=countdown)
+    with make_sink(sink or ["window"], clips[0].body, token=token) as shown, listener:  # type: ignore[arg-type]
+        session = record_session(
+            listener, shown, clips, leader, options=options, name=out.name, tell=lambda text: say.print(f"> {text}")
+        )
+    write_dataset(session.motions, out)
+    table = Table("action", "takes", "frames", "lag \\[s]", "correlation", "verdict")
+    for entry in session.quality:
+        table.add_row(
+            entry.action, str(entry.recordings), str(entry.frames), f"{entry.lag:+.2f}", f"{entry.correlation:.2f}",
+            entry.verdict,
+        )  # fmt: skip
+    say.print(table)
+    for recording, reason in session.left_out.items():
+        say.print(f"- {recording} left out: {reason}", markup=False)
+    say.print(f"written: [bold]{out}[/]; check it: syda-gym motions check {out}", soft_wrap=True)
+
+
+class _Screen:
+    """The live table and the keyboard of ``teleop``."""
+
+    def __init__(self) -> None:
+        from contextlib import ExitStack
+
+        self._stack = ExitStack()
+        self._session: Session | None = None
+        self._live: Any = None
+        self._next = 0.0
+
+    def start(self, session: Session) -> None:
+        from rich.live import Live
+
+        from syda_gym.teleoperation.screen import keyboard, status_table
+
+        self._session = session
+        self._stack.enter_context(keyboard(session.source.inbox))
+        table = status_table(session.loop, session.source, session.statistics)
+        self._live = self._stack.enter_context(Live(table, console=console(stderr=True), auto_refresh=False))
+
+    def update(self, decision: Any) -> None:
+        """Twice a second; drawing takes longer than deciding."""
+        if self._session is None or decision.now < self._next:
+            return
+        from syda_gym.teleoperation.screen import status_table
+
+        self._next = decision.now + 0.5
+        session = self._session
+        self._live.update(status_table(session.loop, session.source, session.statistics), refresh=True)
+
+    def __enter__(self) -> _Screen:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+
+def _end_gently() -> None:
+    """Makes a termination signal end the run as Ctrl-C does, with the robot going to rest."""
+    import signal
+    import threading
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def _print_robot(robot: Robot) -> None:
+    import numpy as np
+    from rich.table import Table
+
+    table = Table(title=robot.name)
+    for heading in ("arm", "joints", "shoulder", "elbow", "wrist", "lengths \\[m]"):
+        table.add_column(heading, overflow="fold")
+    arms = {arm.side: arm for arm in robot.description.arms}
+    for side, lengths in zip(robot.sides, robot.arm_lengths, strict=True):
+        arm = arms[side]
+        table.add_row(
+            side, ", ".join(arm.joints), arm.shoulder, arm.elbow, arm.wrist, f"{lengths[0]:.3f} + {lengths[1]:.3f}"
+        )
+    say = console()
+    say.print(table)
+    speed = [f"{value:.1f}" if np.isfinite(value) else "unknown" for value in (robot.speed.min(), robot.speed.max())]
+    say.print(
+        f"torso {robot.description.torso}; joint speeds {speed[0]} to {speed[1]} rad/s; height {robot.height:.2f} m"
+    )

@@ -1,0 +1,66 @@
+"""The ``syda-gym`` program: every command registered, and how errors and interrupts end."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from syda_gym.cli import agents, benchmark, live, motions, routes, studies
+from syda_gym.cli.shared import console
+from syda_gym.errors import SydaError
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="syda-gym",
+    help="Map a human's motion onto a humanoid, chain such maps, know which chain will work, and prove how good it is.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+)
+
+
+def main() -> None:
+    """Runs the command line; an error of the library is one clear line and exit code 2."""
+    try:
+        app(prog_name="syda-gym")
+    except SydaError as error:
+        console(stderr=True).print(f"error: {error}", style="bold red", markup=False, highlight=False, soft_wrap=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        console(stderr=True).print("interrupted", style="bold red")
+        sys.exit(130)
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.", is_eager=True)] = False,
+) -> None:
+    if version:
+        from syda_gym import __version__
+
+        typer.echo(f"syda-gym {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        raise typer.Exit(code=2)
+
+
+app.command()(studies.demo)
+app.command("reproduce-paper")(studies.reproduce_paper)
+app.command()(routes.transferability)
+app.command()(routes.route)
+app.command()(agents.train)
+app.command()(agents.evaluate)
+app.command()(agents.play)
+app.command()(agents.export)
+app.command()(live.teleop)
+app.command()(live.record)
+app.command()(benchmark.benchmark)
+app.command()(benchmark.compare)
+app.command()(benchmark.suggest)
+app.command("export-episodes")(benchmark.export_episodes)
+app.add_typer(live.robot_app, name="robot")
+app.add_typer(motions.motions_app, name="motions")

@@ -1,0 +1,154 @@
+"""The commands that say which way to go: ``transferability`` and ``route``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from syda_gym.cli.shared import (
+    JsonOption,
+    MotionsOption,
+    SeedOption,
+    print_json,
+    print_table,
+    stages,
+)
+
+__all__ = ["route", "transferability"]
+
+
+def transferability(
+    bodies: Annotated[list[str] | None, typer.Argument(help="Names, URDFs or robot descriptions; all pairs.")] = None,
+    definition: Annotated[str, typer.Option(help="`general` or `paper`.")] = "general",
+    validate: Annotated[bool, typer.Option("--validate", help="Measure whether it predicts held-out errors.")] = False,
+    motions: MotionsOption = "embedded",
+    folds: Annotated[int, typer.Option(help="Groups of actions to hold out (`--validate`).", min=2)] = 4,
+    max_hops: Annotated[int, typer.Option(help="Longest chain (`--validate`).", min=1)] = 3,
+    picture: Annotated[
+        Path | None, typer.Option(help="Write clouds and regions of the first pair (or the validation) as PNG.")
+    ] = None,
+    seed: SeedOption = 0,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure how well each body can stand in for each other one, term by term."""
+    from itertools import permutations
+
+    from syda_gym.embodiments import catalog
+    from syda_gym.evaluation.prediction.tables import links_table, prediction_table
+    from syda_gym.files import write_bytes
+    from syda_gym.routes.metric import transferability as measure
+
+    if validate:
+        from syda_gym.evaluation.prediction.study import validate as measure_prediction
+
+        with stages({"fit": "Fitting every pair and fold", "chains": "Scoring every chain"}) as tell:
+            study = measure_prediction(
+                motions, bodies=bodies or None, folds=folds, max_hops=max_hops, seed=seed, progress=tell
+            )
+        tables = [prediction_table(study), *([prediction_table(study, full=True)] if study.full_scores else [])]
+        if picture:
+            from syda_gym.evaluation.prediction.picture import prediction_png
+
+            write_bytes(picture, prediction_png(study))
+        if as_json:
+            print_json(study.as_dict())
+        for table in () if as_json else tables:
+            print_table(table)
+        return
+    names = list(bodies or ("adult", "kid", "pepper", "nao"))
+    chosen = [
+        catalog.resolve(name) for name in (names if len(names) > 1 else [*names, "adult", "kid", "pepper", "nao"])
+    ]
+    distinct = list({body.name: body for body in chosen}.values())
+    pairs = list(permutations(distinct, 2))
+    if len(names) == 1:  # one body: how it leads and follows the others
+        pairs = [(a, b) for a, b in pairs if distinct[0] in (a, b)]
+    kind: Any = definition  # checked, with the nearest name, where it is used
+    links = [measure(a, b, kind, seed=seed) for a, b in pairs]
+    if picture:
+        from syda_gym.routes.pictures import clouds_png
+
+        write_bytes(picture, clouds_png(*pairs[0], kind, seed=seed))
+    print_json([link.as_dict() for link in links]) if as_json else print_table(links_table(links))
+
+
+def route(
+    source: Annotated[str, typer.Option("--from", help="Who leads.")],
+    target: Annotated[str, typer.Option("--to", help="Who follows.")],
+    pairs: Annotated[
+        list[str] | None, typer.Option("--pair", help="A fitted pair `A:B`; may be repeated. Default: all recorded.")
+    ] = None,
+    motions: MotionsOption = "embedded",
+    definition: Annotated[str, typer.Option(help="`general` or `paper`.")] = "general",
+    max_hops: Annotated[int | None, typer.Option(help="Longest chain.", min=1)] = None,
+    predictor: Annotated[
+        str, typer.Option(help="What decides: `T`, `C`, `L`, `coverage`, `hops`, or `measured`.")
+    ] = "T",
+    count: Annotated[int, typer.Option(help="How many routes to list.", min=1)] = 5,
+    noise: Annotated[bool, typer.Option("--noise", help="Take alpha from the noise of the recordings.")] = False,
+    suggest: Annotated[bool, typer.Option("--suggest", help="Also say which pair to record next.")] = False,
+    picture: Annotated[Path | None, typer.Option(help="Write the graph with the chosen route as PNG.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Choose the chain of bodies from one to another that transferability ranks best."""
+    from syda_gym.evaluation.prediction.tables import routes_table, suggestions_table
+    from syda_gym.files import write_bytes
+    from syda_gym.routes import routing, suggestion
+
+    kind: Any = definition  # checked, with the nearest name, where it is used
+    fitted, bodies = _fitted_pairs(pairs, motions)
+    options: dict[str, Any] = {"max_hops": max_hops, "predictor": predictor}
+    if predictor == "measured":
+        from syda_gym.evaluation.prediction.study import measure_bodies
+
+        named = [(getattr(a, "name", a), getattr(b, "name", b)) for a, b in fitted]
+        with stages({"fit": "Fitting pairs to measure bodies"}) as tell:
+            options["predictor"] = measure_bodies(motions, named, progress=tell)
+    if noise:
+        from syda_gym.evaluation.prediction.study import motion_noise
+        from syda_gym.motions.loading import load_motions
+        from syda_gym.routes.noise import alpha_from_noise
+
+        options["alpha"] = alpha_from_noise(motion_noise(load_motions(motions)))
+    best = routing.best_route(source, target, fitted, kind, **options)
+    ranked = routing.ranked_routes(source, target, fitted, kind, count=count, **options)
+    routes = [best, *(other for other in ranked if other.bodies != best.bodies)][:count]
+    further, spanning = None, None
+    if suggest:
+        further = suggestion.suggest(bodies, fitted, kind, **options)[:count]
+        spanning = suggestion.spanning_pairs(
+            bodies, (), kind, predictor=options["predictor"], alpha=options.get("alpha")
+        )
+    if picture:
+        from syda_gym.routes.pictures import graph_png
+
+        graph = routing.BodyGraph((), fitted, kind, predictor=options["predictor"], alpha=options.get("alpha"))
+        write_bytes(picture, graph_png(graph, best))
+    if as_json:
+        print_json({
+            "routes": [item.as_dict() for item in routes],
+            "suggestions": [{"pair": s.pair, "gain": s.gain, "sum": s.total} for s in further or ()],
+            "spanning": spanning.pairs if spanning else [],
+        })  # fmt: skip
+        return
+    print_table(routes_table(routes, predictor))
+    if further is not None:
+        print_table(suggestions_table(further, spanning))
+
+
+def _fitted_pairs(pairs: list[str] | None, motions: str) -> tuple[list[tuple[Any, Any]], list[Any]]:
+    """Pairs as the user named them, or all that were recorded together; and everybody who can be paired."""
+    from syda_gym.errors import OptionError
+    from syda_gym.motions.loading import load_motions
+
+    if not pairs:
+        recorded = load_motions(motions)
+        fitted = [(recorded.bodies[a], recorded.bodies[b]) for a, b in recorded.pairs]
+        return fitted, list(recorded.bodies.values())
+    for pair in pairs:
+        if pair.count(":") != 1:
+            raise OptionError(f"--pair takes two bodies as A:B, for example adult:kid; got {pair!r}")
+    named = [(pair.split(":")[0], pair.split(":")[1]) for pair in pairs]
+    return named, list(dict.fromkeys(name for pair in named for name in pair))

@@ -1,0 +1,324 @@
+"""The demo's folder: page, plots, picture and film, made from a ``DemoResult``."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from syda_gym.evaluation.chains import name_of
+from syda_gym.evaluation.demo.playback import _SHOWN_HZ, _liveliest, _stride, _tracks, playback_chain
+from syda_gym.evaluation.drawing import draw, write_png
+from syda_gym.evaluation.report import (
+    BarPlot,
+    Column,
+    Headline,
+    Picture,
+    Playback,
+    Report,
+    RouteEdge,
+    RouteGraph,
+    Section,
+    Table,
+    Text,
+    Track,
+    track,
+    write_report,
+)
+from syda_gym.evaluation.report.model import Block, Cell
+from syda_gym.evaluation.report.plots import bar_svg, standalone
+from syda_gym.evaluation.statistics import Estimate, spearman
+from syda_gym.files import write_json, write_text
+from syda_gym.simulation.pictures.video import write_video
+
+if TYPE_CHECKING:
+    from syda_gym.evaluation.demo.results import ChainResult, DemoResult
+
+__all__ = ["chain_table", "provenance", "transferability_table", "write_demo_report"]
+
+_TABLE_2 = {
+    ("adult", "pepper"): 0.2358, ("kid", "pepper"): 0.2335, ("pepper", "kid"): 0.2002, ("pepper", "adult"): 0.1991,
+}  # fmt: skip
+_FILM_FRAMES = 75  # five seconds
+_LANDMARKS = {"left": ("L elbow", "L wrist"), "right": ("R elbow", "R wrist")}
+
+
+def write_demo_report(
+    result: DemoResult, folder: Path, *, command: str = "", progress: Callable[[float], None] | None = None
+) -> Path:
+    """Writes the page and, beside it, the plots (SVG), a picture (PNG), a film (MP4) and all figures (JSON).
+
+    Args:
+        result: of ``run_demo``.
+        folder: exists.
+        command: the command line, for the provenance.
+        progress: told the finished fraction.
+
+    Returns:
+        The path of the page.
+    """
+    tell = progress or (lambda done: None)
+    landmarks, joints = _landmark_plot(result), _joint_plot(result)
+    for plot, name in ((landmarks, "landmarks"), (joints, "joints")):
+        write_text(folder / f"{name}.svg", standalone(bar_svg(plot)))
+    best = _best_chain(result)
+    recording, mapping = best.shown[0]
+    tracks = _tracks(recording, mapping)
+    reference = track(result.robot, recording.reference[:: _stride(recording)])
+    names = [*recording.route[:-1], f"{recording.route[-1]} (simulated)", f"{recording.route[-1]} (recorded)"]
+    shown = [*tracks, reference]
+    title = f"{best.name}: {recording.motion}, a held-out action"
+    middle = _liveliest(tracks[0])
+    picture = draw(shown, middle, labels=names, title=title)
+    write_png(picture, folder / "side_by_side.png")
+    write_video(folder / "chains.mp4", _film(shown, names, title, tell), _SHOWN_HZ)
+    sections = [
+        Section("Playback", [_playback(result)]),
+        Section("Which way to go", [_graph(result), transferability_table(result), _regions(result)]),
+        Section("How good the chains are", [*_chain_words(result), chain_table(result), landmarks, joints]),
+        *([Section("The residual policy", result.residual.blocks())] if result.residual else []),
+        Section(
+            "Pictures",
+            [
+                Picture("Side by side", (folder / "side_by_side.png").read_bytes()),
+                Picture("Film", (folder / "chains.mp4").read_bytes(), "video/mp4"),
+            ],
+        ),
+    ]
+    kind = "synthetic motions, generated from a seed" if result.motions.synthetic else "recorded motions"
+    report = Report(
+        "From a human's motion to a humanoid's",
+        f"{result.motions.name} ({kind}); every figure is of actions that the mappings had not seen",
+        _headlines(result, best),
+        sections,
+        provenance(command, result),
+    )
+    write_json(folder / "results.json", _results(result))
+    return write_report(report, folder)
+
+
+def transferability_table(result: DemoResult) -> Table:
+    """S, D, L, alpha, C and T of every link, with the paper's definition where it applies."""
+    rows: list[list[Cell]] = []
+    for (a, b), link in result.links.items():
+        paper = result.paper_links.get((a, b))
+        rows.append(
+            [f"{a}>{b}", Estimate(link.T, link.T - link.tolerance, link.T + link.tolerance), paper.T if paper else None,
+             _TABLE_2.get((a, b)), 1 - link.S, 1 - link.D, link.L, link.coverage]
+        )  # fmt: skip
+    columns = [
+        Column("Link"),
+        Column("T", tip="transferability, general definition, with its tie band (Eq. 10)"),
+        Column("T, the paper's", digits=4, tip="by the paper's own definition"),
+        Column("Table 2", digits=4, tip="as the paper printed it"),
+        Column("1-S", tip="share of cells where the follower lacks manipulability (Eq. 8)"),
+        Column("1-D", tip="similarity there (Eq. 9)"),
+        Column("L", tip="length ratio (Eq. 7)"),
+        Column("Coverage", tip="share of the leader's cells that the follower reaches at all"),
+    ]
+    chosen = {edge for route in _chosen_routes(result) for edge in zip(route[:-1], route[1:], strict=True)}
+    strong = [index for index, edge in enumerate(result.links) if edge in chosen]
+    return Table("Transferability of every fitted pair", columns, rows, "Links of a chosen route are marked.", strong)
+
+
+def chain_table(result: DemoResult) -> Table:
+    """Every chain with its figures."""
+    columns = [
+        Column("Chain"),
+        Column("T", tip="product of transferabilities along the chain (Eq. 11)"),
+        Column("Landmark error", "cm", 1, 100, "robot against recorded motion, interquartile mean over episodes"),
+        Column("Mapping alone", "cm", 1, 100, "base command against recorded motion, without motors"),
+        Column("Joint error", "deg", 1, 180 / np.pi),
+        Column("Success", "%", 0, 100, "episodes with a mean landmark error below 10 cm"),
+        Column("Jitter", "mm/frame³", 2, 1000),
+        Column("Speed violations", "%", 2, 100, "commands above a joint's speed limit"),
+        Column("Limit violations", "%", 2, 100, "joint samples of the raw mapping outside the limits"),
+        Column("Self-collision", "%", 1, 100, "frames in which the robot touches itself"),
+        Column("Bound holds", "%", 0, 100, "frames whose mapping error lies within the error bound"),
+        Column("Latency", "ms", 3, 1000, "one frame through the chain"),
+        Column("Episodes"),
+    ]
+    rows: list[list[Cell]] = [
+        [
+            chain.name,
+            chain.transferability,
+            chain.figure("landmark_error"),
+            chain.figure("mapping_error"),
+            chain.figure("joint_error"),
+            _mean(chain, "success"),
+            _mean(chain, "jitter"),
+            _mean(chain, "speed_violations"),
+            _mean(chain, "limit_violations"),
+            _mean(chain, "self_collisions"),
+            _mean(chain, "coverage"),
+            chain.seconds_per_frame,
+            len(chain.episodes),
+        ]
+        for chain in result.chains
+    ]
+    strong = [i for i, chain in enumerate(result.chains) if chain.route in _chosen_routes(result)]
+    note = (
+        "Intervals are 95 % bootstrap intervals over actions. The route that transferability chooses for each operator "
+        "is marked."
+    )
+    return Table("Every chain as episodes", columns, rows, note, strong)
+
+
+def provenance(command: str, result: DemoResult) -> dict[str, str]:
+    """What made the numbers."""
+    from syda_gym import __version__
+
+    held_out = "; ".join(", ".join(group) for group in result.held_out)
+    return {
+        "Command": command or "syda_gym.evaluation.demo.run.run_demo",
+        "Motions": f"{result.motions.name}, {len(result.motions.takes)} takes",
+        "Held-out actions": held_out if len(result.held_out) == 1 else f"each once: {held_out}",
+        "Seed": str(result.seed),
+        "Models fitted": str(result.models),
+        "Versions": f"syda-gym {__version__}, Python {platform.python_version()}, NumPy {np.__version__}",
+        "Machine": f"{platform.machine()}, {platform.system()}",
+        "Wall time": ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in result.seconds.items()),
+    }
+
+
+def _headlines(result: DemoResult, best: ChainResult) -> list[Headline]:
+    error = best.figure("landmark_error")
+    operator = best.route[0]
+    route = result.chosen[operator]
+    ties = ", ".join(name_of(other.bodies) for other in route.ties)
+    lines = [
+        Headline(
+            f"Landmark error, {best.name}",
+            f"{100 * error.value:.1f} cm",
+            f"95 % interval {100 * error.low:.1f} to {100 * error.high:.1f} cm, {error.count} unseen episodes",
+            "good" if error.value < 0.1 else "warn",
+        ),
+        Headline(
+            f"Route chosen for {operator}",
+            " > ".join(route.bodies),
+            f"transferability {route.T:.3f}" + (f"; within sampling noise of {ties}" if ties else ""),
+        ),
+        Headline("Success", f"{100 * _mean(best, 'success'):.0f} %", "episodes below 10 cm of mean landmark error"),
+    ]
+    coverage = _mean(best, "coverage")
+    if np.isfinite(coverage):
+        held = f"{100 * coverage:.0f} % of frames"
+        lines.append(Headline("Error bound holds", held, "asked for 90 %", "good" if coverage >= 0.9 else "warn"))
+    if result.residual:
+        lines.append(result.residual.headline())
+    return lines
+
+
+def _chosen_routes(result: DemoResult) -> list[tuple[str, ...]]:
+    return [route.bodies for route in result.chosen.values()]
+
+
+def _regions(result: DemoResult) -> Picture:
+    """Where the robot can stand in for the first operator, after Fig. 3 of the paper."""
+    from syda_gym.routes.pictures import clouds_png
+
+    operator = next(iter(result.chosen))
+    png = clouds_png(result.motions.bodies[operator], result.robot, samples=2**18)
+    return Picture(f"Where {result.robot.name} can move as {operator} does", png)
+
+
+def _best_chain(result: DemoResult) -> ChainResult:
+    """The chosen chain of the first operator."""
+    route = next(iter(result.chosen.values())).bodies
+    return next(chain for chain in result.chains if chain.route == route)
+
+
+def _chain_words(result: DemoResult) -> list[Block]:
+    scores = [chain.transferability for chain in result.chains]
+    errors = [chain.figure("landmark_error").value for chain in result.chains]
+    if len(scores) < 4:
+        return []
+    rank = spearman(scores, errors)
+    if np.isnan(rank.value):
+        return []
+    return [
+        Text(
+            f"Rank correlation of transferability with landmark error over these {rank.count} chains: "
+            f"{rank.value:+.2f} (95 % interval {rank.low:+.2f} to {rank.high:+.2f}); a useful ranking is negative."
+        )
+    ]
+
+
+def _landmark_plot(result: DemoResult) -> BarPlot:
+    groups = [name for side in result.robot.sides for name in _LANDMARKS[side]]
+    series = {chain.name: [chain.part("landmarks", i) for i in range(len(groups))] for chain in result.chains}
+    return BarPlot("Error of each chain at each landmark", "landmark error [cm]", groups, series, 100.0)
+
+
+def _joint_plot(result: DemoResult) -> BarPlot:
+    groups = [_short(name) for name in result.robot.joint_names]
+    best = _chosen_routes(result)
+    shown = [chain for chain in result.chains if chain.route in best or len(chain.route) == 2][:4]
+    series = {chain.name: [chain.part("joints", i) for i in range(len(groups))] for chain in shown}
+    return BarPlot("Error of each chain at each joint", "joint error [degrees]", groups, series, 180 / np.pi)
+
+
+def _short(joint: str) -> str:
+    """``LShoulderPitch`` as ``L sh. pitch``, so that ten joints fit below an axis."""
+    words = "".join(f" {c}" if c.isupper() else c for c in joint).split()
+    return " ".join(words).replace("Shoulder", "sh.").replace("Elbow", "elb.").lower().replace("l ", "L ", 1).replace(
+        "r ", "R ", 1
+    ) if words and words[0] in ("L", "R") else joint  # fmt: skip
+
+
+def _graph(result: DemoResult) -> RouteGraph:
+    bodies = {body: result.motions.bodies[body].kind for edge in result.links for body in edge}
+    errors = {chain.route: chain.figure("mapping_error").value for chain in result.chains if len(chain.route) == 2}
+    edges = [RouteEdge(a, b, link.T, errors.get((a, b))) for (a, b), link in result.links.items()]
+    chosen = next(iter(result.chosen.values())).bodies
+    note = f"Thicker arrows carry a higher transferability; the route chosen for {chosen[0]} is coloured."
+    return RouteGraph("Fitted pairs and the chosen route", dict(bodies), edges, chosen, note)
+
+
+def _playback(result: DemoResult) -> Playback:
+    entries = []
+    for chain in result.chains:
+        for recording, mapping in chain.shown:
+            episode = next(one for one in chain.episodes if one.motion == recording.motion)
+            bound = episode.bound if np.isfinite(episode.bound) else None
+            entries.append(playback_chain(chain.name, recording, mapping, bound=bound))
+    if result.residual:
+        entries += result.residual.playback()
+    note = (
+        "Drag to turn, wheel or pinch to zoom. The ghost is the robot's own recorded motion; the strip shows the mean "
+        "landmark error over time and the mapping's error bound."
+    )
+    return Playback("Operator, intermediates and robot", entries, note)
+
+
+def _film(tracks: Sequence[Track], names: Sequence[str], title: str, tell: Callable[[float], None]) -> Iterator[Any]:
+    count = min(len(tracks[0]), _FILM_FRAMES)
+    for frame in range(count):
+        tell(frame / count)
+        yield draw(tracks, frame, labels=names, title=title, size=(768, 432), finer=1)
+
+
+def _mean(chain: ChainResult, name: str) -> float:
+    return float(np.mean([float(getattr(episode, name)) for episode in chain.episodes]))
+
+
+def _results(result: DemoResult) -> dict[str, Any]:
+    return {
+        "motions": result.motions.name,
+        "seed": result.seed,
+        "held_out": [list(group) for group in result.held_out],
+        "transferability": {name_of(edge): link.as_dict() for edge, link in result.links.items()},
+        "chosen": {operator: route.as_dict() for operator, route in result.chosen.items()},
+        "chains": {
+            chain.name: {
+                "transferability": chain.transferability,
+                "landmark_error": chain.figure("landmark_error").to_dict(),
+                "episodes": [episode.to_dict() for episode in chain.episodes],
+            }
+            for chain in result.chains
+        },
+        "residual": result.residual.to_dict() if result.residual else None,
+    }

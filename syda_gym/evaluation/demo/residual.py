@@ -1,0 +1,119 @@
+"""The demo's short residual run: trained on the fitted actions, compared with its rivals on the held-out ones.
+
+It is trained on the robot's own recorded motion and judged on actions that neither it nor the mapping has seen, beside
+the analytic lead, which undoes the motors' lag by formula.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from syda_gym.embodiments.embodiment import landmark_error
+from syda_gym.evaluation.chains import Links
+from syda_gym.evaluation.demo.residual_result import AgentResult, ResidualResult
+from syda_gym.evaluation.episodes import Recording, figures_of_all, make_env, play_all
+from syda_gym.motions.clip import Motions
+
+if TYPE_CHECKING:
+    from syda_gym.agents.agent import Agent
+    from syda_gym.agents.residual.config import ResidualConfig
+    from syda_gym.mappings.mapping import Mapping
+
+__all__ = ["train_and_compare"]
+
+PRESET = "short"
+"""Hyper-parameters of the demo: about ten seconds of training in the servo model."""
+
+
+def train_and_compare(
+    motions: Motions,
+    route: Sequence[str],
+    held_out: Sequence[str],
+    seed: int = 0,
+    *,
+    config: ResidualConfig | None = None,
+    links: Links | None = None,
+    folder: str | os.PathLike[str] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> ResidualResult:
+    """Trains a residual on all other actions and plays base, lead and residual on the held-out ones.
+
+    Args:
+        motions: the data set.
+        route: the chain that gives the base command.
+        held_out: actions for the comparison.
+        seed: of the fits, the training and the episodes.
+        config: hyper-parameters; the preset ``PRESET`` if ``None``.
+        links: fitted links to take the chain from; fitted anew if ``None``.
+        folder: where ``residual.safetensors`` and ``residual.json`` are stored; nowhere if ``None``.
+        progress: told the finished fraction.
+    """
+    from syda_gym.agents.agent import BaseAlone
+    from syda_gym.agents.bundle import save_agent
+    from syda_gym.agents.classical.rivals import Lead
+    from syda_gym.agents.learned.policy import ResidualPolicy
+    from syda_gym.agents.residual.config import ResidualConfig
+    from syda_gym.agents.residual.residual_training import train_residual
+
+    tell = progress or (lambda done: None)
+    mapping = (links or Links(motions, seed=seed, groups=[tuple(held_out)])).chain(route, held_out)
+    training = [name for name in motions.pair(route[0], route[-1]).action_names if name not in held_out]
+    options: dict[str, Any] = {"operator": route[0], "robot": route[-1], "mapping": mapping, "motions": motions}
+    settings = config or ResidualConfig.preset(PRESET)
+    trained = train_residual(
+        {**options, "actions": training},
+        settings,
+        seed=seed,
+        progress=lambda done: tell(0.8 * done),
+    )
+    interface = trained.agent.interface
+    agents: dict[str, Agent] = {
+        "base": BaseAlone(interface),
+        "lead": Lead(interface, BaseAlone(interface)),
+        "residual": trained.agent,
+    }
+    results = []
+    for place, (name, agent) in enumerate(agents.items()):
+        results.append(_played(mapping, motions, held_out, name, agent, seed))
+        tell(0.8 + 0.2 * (place + 1) / len(agents))
+    untrained = ResidualPolicy.untrained(interface, BaseAlone(interface), scale=settings.scale)
+    equal = _same_start(mapping, motions, held_out, untrained, results[0].recordings[0], seed)
+    result = ResidualResult(tuple(route), mapping, tuple(held_out), trained, equal, tuple(results))
+    if folder is not None:
+        save_agent(
+            trained.agent,
+            os.path.join(folder, "residual"),
+            mapping=mapping.card.to_json(),
+            training={"config": settings.as_dict(), "seed": seed, "actions": training},
+            figures={"held_out": list(held_out), "change_m": result.change().to_dict()},
+        )
+    return result
+
+
+def _played(
+    mapping: Mapping, motions: Motions, held_out: Sequence[str], name: str, agent: Agent, seed: int
+) -> AgentResult:
+    """An environment of its own for every agent: after a contact Bullet does not start again from the same bits."""
+    env = make_env(mapping, motions, held_out, self_collision=True)
+    try:
+        recordings = tuple(play_all(env, agent, seed))
+        tracking = tuple(float(landmark_error(env.robot, one.q, one.base).mean()) for one in recordings)
+        figures = tuple(figures_of_all(recordings, env.robot, mapping))
+        return AgentResult(name, figures, tracking, recordings)
+    finally:
+        env.close()
+
+
+def _same_start(
+    mapping: Mapping, motions: Motions, held_out: Sequence[str], agent: Agent, expected: Recording, seed: int
+) -> bool:
+    """Whether an agent's first episode equals a recorded one bit for bit."""
+    env = make_env(mapping, motions, held_out, self_collision=True)
+    try:
+        return bool(np.array_equal(next(iter(play_all(env, agent, seed))).q, expected.q))
+    finally:
+        env.close()

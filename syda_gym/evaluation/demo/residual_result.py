@@ -1,0 +1,173 @@
+"""What the demo's residual run gave: agents on the held-out actions, and how that is told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from syda_gym.evaluation.chains import Route, name_of
+from syda_gym.evaluation.episodes import EpisodeFigures, Recording
+from syda_gym.evaluation.report import BarPlot, Column, CurvePlot, Headline, PlaybackChain, Table, Text
+from syda_gym.evaluation.report.model import Block, Cell
+from syda_gym.evaluation.statistics import Estimate, clustered_estimate
+
+if TYPE_CHECKING:
+    from syda_gym.agents.residual.residual_training import Trained
+    from syda_gym.mappings.mapping import Mapping
+
+__all__ = ["AgentResult", "ResidualResult"]
+
+
+@dataclass(frozen=True, eq=False)
+class AgentResult:
+    """One agent on the held-out actions.
+
+    Attributes:
+        name: of the agent.
+        episodes: figures against the recorded motion.
+        tracking: mean landmark distance of each episode from what the mapping asked for [m].
+        recordings: of each episode.
+    """
+
+    name: str
+    episodes: tuple[EpisodeFigures, ...]
+    tracking: tuple[float, ...]
+    recordings: tuple[Recording, ...]
+
+    def estimate(self, values: Sequence[float]) -> Estimate:
+        """Interquartile mean with an interval over actions."""
+        return clustered_estimate(values, [episode.action for episode in self.episodes])
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualResult:
+    """What the short run gave.
+
+    Attributes:
+        route: of the chain below.
+        mapping: that chain.
+        held_out: actions that neither the mapping nor the policy had seen.
+        trained: the policy and how it learnt.
+        untrained_is_base: whether the untrained policy gave exactly the base's trajectories.
+        agents: base alone, analytic lead and residual.
+    """
+
+    route: Route
+    mapping: Mapping
+    held_out: tuple[str, ...]
+    trained: Trained
+    untrained_is_base: bool
+    agents: tuple[AgentResult, ...]
+
+    def agent(self, name: str) -> AgentResult:
+        """The result of one agent."""
+        return next(agent for agent in self.agents if agent.name == name)
+
+    def change(self) -> Estimate:
+        """Change of the landmark error from base to residual [m], episode by episode, interval over actions."""
+        base, policy = self.agent("base"), self.agent("residual")
+        pairs = zip(policy.episodes, base.episodes, strict=True)
+        return base.estimate([after.landmark_error - before.landmark_error for after, before in pairs])
+
+    def headline(self) -> Headline:
+        """Base against residual in one number."""
+        base, policy = (
+            self.agent(name).estimate([episode.landmark_error for episode in self.agent(name).episodes]).value
+            for name in ("base", "residual")
+        )
+        change = self.change()
+        return Headline(
+            "Residual: landmark error",
+            f"{100 * (policy / base - 1):+.0f} %",
+            f"{100 * base:.2f} to {100 * policy:.2f} cm on unseen actions; change {_words(change)}",
+            "good" if change.high < 0 else "plain" if change.low <= 0 else "warn",
+        )
+
+    def table(self) -> Table:
+        """Every agent beside the base."""
+        columns = [
+            Column("Agent"),
+            Column("Tracking error", "mm", 2, 1000, "landmarks from where the mapping asked them to be"),
+            Column("Landmark error", "cm", 2, 100, "landmarks from the recorded motion"),
+            Column("Joint error", "deg", 2, 180 / np.pi, "against the recorded motion"),
+            Column("Jitter", "mm/frame³", 2, 1000),
+            Column("Reward", "", 1),
+        ]
+        rows: list[list[Cell]] = [
+            [
+                agent.name,
+                agent.estimate(agent.tracking),
+                agent.estimate([episode.landmark_error for episode in agent.episodes]),
+                agent.estimate([episode.joint_error for episode in agent.episodes]),
+                agent.estimate([episode.jitter for episode in agent.episodes]),
+                agent.estimate([episode.reward for episode in agent.episodes]),
+            ]
+            for agent in self.agents
+        ]
+        equal = "equals the base bit for bit" if self.untrained_is_base else "differs from the base: a fault"
+        note = (
+            f"{name_of(self.route)} on {len(self.held_out)} held-out actions "
+            f"({len(self.agents[0].episodes)} episodes) in Bullet. The untrained policy {equal}. The lead knows the "
+            "motors' lag exactly; what is left is the mapping's error on unseen actions."
+        )
+        return Table("Base, lead and residual on unseen actions", columns, rows, note)
+
+    def blocks(self) -> list[Block]:
+        """The report's section."""
+        change = self.change()
+        verdict = "an improvement" if change.high < 0 else "a loss" if change.low > 0 else "no difference shown"
+        series = {
+            agent.name: [
+                agent.estimate([episode.landmark_error for episode in agent.episodes]),
+                agent.estimate(agent.tracking),
+            ]
+            for agent in self.agents
+        }
+        steps = [leg.steps / 1000 for leg in self.trained.history]
+        curve = {
+            "residual": [Estimate.exactly(leg.policy.landmark_mm) for leg in self.trained.history],
+            "base alone": [Estimate.exactly(leg.base.landmark_mm) for leg in self.trained.history],
+        }
+        groups = ["from the recorded motion", "from what the mapping asked for"]
+        return [
+            Text(
+                "Landmark error of the residual minus that of the base, episode by episode: "
+                f"{_words(change)}: {verdict}."
+            ),
+            self.table(),
+            BarPlot("Distance of the robot's landmarks", "mm", groups, series, 1000.0),
+            CurvePlot(
+                "How the policy learnt", "thousand steps", "landmark error [mm]", steps, curve, 1.0,
+                "On validation streams of the training actions, in the servo model.",
+            ),
+        ]  # fmt: skip
+
+    def playback(self) -> list[PlaybackChain]:
+        """The residual's first episodes for the playback."""
+        from syda_gym.evaluation.demo.playback import playback_chain
+
+        name = f"{name_of(self.route)} + residual"
+        return [playback_chain(name, one, self.mapping) for one in self.agent("residual").recordings[:2]]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON-able data."""
+        return {
+            "route": list(self.route),
+            "held_out": list(self.held_out),
+            "untrained_is_base": self.untrained_is_base,
+            "change_m": self.change().to_dict(),
+            "agents": {
+                agent.name: {
+                    "tracking_m": list(agent.tracking),
+                    "episodes": [episode.to_dict() for episode in agent.episodes],
+                }
+                for agent in self.agents
+            },
+        }
+
+
+def _words(change: Estimate) -> str:
+    return f"{1000 * change.value:+.1f} mm (95 % interval {1000 * change.low:+.1f} to {1000 * change.high:+.1f})"

@@ -1,0 +1,236 @@
+"""The demo: from recordings to benchmarked chains in one call, as ``syda-gym demo`` runs it."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from syda_gym.embodiments.robot import Robot
+from syda_gym.errors import OptionError, StorageError, nearest_name
+from syda_gym.evaluation.chains import Links, Route, action_groups, all_routes, robots_of
+from syda_gym.evaluation.demo.results import ChainResult, DemoResult
+from syda_gym.evaluation.episodes import EpisodeFigures, Recording, figures_of_all, latency, make_env, play_all
+from syda_gym.motions.clip import Motions
+from syda_gym.motions.loading import load_motions
+
+if TYPE_CHECKING:
+    from syda_gym.agents.agent import Agent
+    from syda_gym.mappings.mapping import Mapping
+    from syda_gym.routes.metric import Transferability
+    from syda_gym.routes.routing import Route as BestRoute
+
+__all__ = ["run_demo"]
+
+Progress = Callable[[str, float], None]
+"""Told the name of the stage and its finished fraction."""
+
+_BODIES = ("adult", "kid", "nao", "pepper")
+"""Bodies of the demo, where the motions have them: a small graph that still has several ways to go."""
+
+_FEW_ACTIONS = 12  # up to so many actions each is left out once; with more, one fifth is held out
+_SAMPLES = 2**18  # of each workspace; the spread over seeds is printed
+
+
+def run_demo(
+    motions: str | os.PathLike[str] | Motions = "embedded",
+    out: str | os.PathLike[str] = "demo",
+    *,
+    robot: str | None = None,
+    seed: int = 0,
+    residual: bool = True,
+    command: str = "",
+    progress: Progress | None = None,
+) -> DemoResult:
+    """Fits the pairs, ranks and plays every chain, trains a short residual and writes the report.
+
+    Args:
+        motions: what ``load_motions`` takes.
+        out: folder for report, plots, picture and film; created if need be.
+        robot: who is driven; the first robot of the motions if ``None``.
+        seed: of everything random.
+        residual: whether to train the residual.
+        command: the command line, for the report.
+        progress: told stage and finished fraction.
+
+    Raises:
+        SydaError: unusable motions or folder; nothing half-written stays behind.
+    """
+    from syda_gym.evaluation.demo.report import write_demo_report
+
+    tell = progress or (lambda stage, done: None)
+    clock = _Clock(tell)
+    folder = _folder(out)
+    with clock("load"):
+        data = load_motions(motions)
+        driven = _robot(data, robot)
+        bodies = [name for name in data.bodies if name in _BODIES or name == driven.name or len(data.bodies) <= 4]
+        operators = [name for name in bodies if data.bodies[name].kind == "human"][:2]
+        routes = all_routes(data, operators, [driven.name], 2, via=bodies)
+        operators = list(dict.fromkeys(route[0] for route in routes))
+        groups = _groups(data, operators[0], driven.name, seed)
+    with clock("transferability"):
+        links, paper_links = _measure(data, routes, tell)
+        products = {route: float(np.prod([links[edge].T for edge in _edges(route)])) for route in routes}
+        chosen = {operator: _best(data, routes, operator, driven.name) for operator in operators}
+    fitted = Links(data, seed=seed, groups=groups)
+    with clock("fit"):
+        edges = list(dict.fromkeys(edge for route in routes for edge in _edges(route)))
+        for done, edge in enumerate(edges):
+            tell("fit", done / len(edges))
+            fitted.link(*edge, groups[0])
+    with clock("play"):
+        chains = []
+        for done, route in enumerate(routes):
+            tell("play", done / len(routes))
+            chains.append(_play_chain(data, route, fitted, groups, products[route], seed))
+    learned = None
+    if residual:
+        from syda_gym.evaluation.demo.residual import train_and_compare
+
+        with clock("residual"):
+            route = chosen[operators[0]].bodies
+            apart = groups[0] if len(groups) == 1 else _third(data.pair(route[0], route[-1]).action_names, seed)
+            known = fitted if apart in fitted.groups else None
+            learned = train_and_compare(
+                data, route, apart, seed, links=known, folder=folder, progress=lambda done: tell("residual", done)
+            )
+    result = DemoResult(
+        data, driven, tuple(groups), links, paper_links, chosen, tuple(chains), fitted.count(), learned,
+        clock.seconds, seed,
+    )  # fmt: skip
+    with clock("report"):
+        page = write_demo_report(result, folder, command=command, progress=lambda done: tell("report", done))
+    return DemoResult(**{**result.__dict__, "report": page})
+
+
+class _Clock:
+    """Times stages and tells when they begin and end."""
+
+    def __init__(self, tell: Progress) -> None:
+        self._tell = tell
+        self.seconds: dict[str, float] = {}
+        self._stage, self._start = "", 0.0
+
+    def __call__(self, stage: str) -> _Clock:
+        self._stage = stage
+        return self
+
+    def __enter__(self) -> None:
+        self._start = time.perf_counter()
+        self._tell(self._stage, 0.0)
+
+    def __exit__(self, *error: object) -> None:
+        self.seconds[self._stage] = time.perf_counter() - self._start
+        if error[0] is None:
+            self._tell(self._stage, 1.0)
+
+
+def _folder(out: str | os.PathLike[str]) -> Path:
+    """The output folder, made and tried before minutes of work are spent."""
+    folder = Path(out)
+    probe = folder / ".writable"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise StorageError(f"cannot write into {folder}: {error.strerror}; choose another folder with --out") from error
+    return folder
+
+
+def _robot(motions: Motions, name: str | None) -> Robot:
+    known = robots_of(motions)
+    if not known:
+        raise OptionError(f"{motions.name} holds no robot's motion; the demo drives a robot")
+    if name is not None and name not in known:
+        raise OptionError(f"{motions.name} has no robot {name!r}; {nearest_name(name, known)}")
+    body = motions.bodies[name or ("pepper" if "pepper" in known else known[0])]
+    assert isinstance(body, Robot)
+    return body
+
+
+def _groups(motions: Motions, operator: str, robot: str, seed: int) -> list[tuple[str, ...]]:
+    """Few actions: each is left out once. Many: one fifth of them, spread over the families, is held out."""
+    pair = motions.pair(operator, robot)
+    names = list(pair.action_names)
+    if len(names) <= _FEW_ACTIONS:
+        return action_groups(names)
+    rng = np.random.default_rng(seed)
+    by_family: dict[str, list[str]] = {}
+    for name in (names[i] for i in rng.permutation(len(names))):
+        by_family.setdefault(motions.families.get(name, name), []).append(name)
+    families = sorted(by_family)
+    order = [families[i] for i in rng.permutation(len(families))]
+    picked = [by_family[family][0] for family in order][: len(names) // 5]
+    return [tuple(sorted(picked))]
+
+
+def _third(actions: Sequence[str], seed: int) -> tuple[str, ...]:
+    """A third of the actions, which the policy's training leaves out."""
+    picked = np.random.default_rng(seed).permutation(len(actions))[: max(1, len(actions) // 3)]
+    return tuple(sorted(actions[i] for i in picked))
+
+
+def _edges(route: Sequence[str]) -> list[tuple[str, str]]:
+    return list(zip(route[:-1], route[1:], strict=True))
+
+
+def _measure(
+    motions: Motions, routes: list[Route], tell: Progress
+) -> tuple[dict[tuple[str, str], Transferability], dict[tuple[str, str], Transferability]]:
+    from syda_gym.routes.metric import transferability
+    from syda_gym.routes.paper import PAPER_ALPHA
+
+    edges = list(dict.fromkeys(edge for route in routes for edge in _edges(route)))
+    in_paper = {name for pair in PAPER_ALPHA for name in pair} | {"adult", "kid", "pepper"}
+    general, paper = {}, {}
+    for done, (a, b) in enumerate(edges):
+        tell("transferability", done / len(edges))
+        general[a, b] = transferability(motions.bodies[a], motions.bodies[b], samples=_SAMPLES)
+        if {a, b} <= in_paper:
+            paper[a, b] = transferability(a, b, "paper")
+    return general, paper
+
+
+def _best(motions: Motions, routes: list[Route], operator: str, robot: str) -> BestRoute:
+    from syda_gym.routes.routing import best_route
+
+    pairs = list(dict.fromkeys(edge for route in routes for edge in _edges(route)))
+    fitted = [(motions.bodies[a], motions.bodies[b]) for a, b in pairs]
+    ends = motions.bodies[operator], motions.bodies[robot]
+    return best_route(*ends, fitted, max_hops=2, directed=True, samples=_SAMPLES)
+
+
+def _play_chain(
+    motions: Motions, route: Route, links: Links, groups: Sequence[tuple[str, ...]], product: float, seed: int
+) -> ChainResult:
+    episodes: list[EpisodeFigures] = []
+    shown: list[tuple[Recording, Mapping]] = []
+    seconds = []
+    for index, group in enumerate(groups):
+        mapping = links.chain(route, group)
+        env = make_env(mapping, motions, group, self_collision=True)
+        try:
+            recordings = list(play_all(env, base_alone(env), seed))
+            episodes += figures_of_all(recordings, env.robot, mapping)
+            for recording in recordings:
+                if len(shown) < 3 and recording.action not in {one.action for one, _ in shown}:
+                    shown.append((recording, mapping))
+            if index == 0:
+                seconds.append(latency(mapping, None, recordings[0].operator))
+        finally:
+            env.close()
+    return ChainResult(route, product, tuple(episodes), tuple(shown), float(np.median(seconds)))
+
+
+def base_alone(env: Any) -> Agent:
+    """The agent that passes on the base command."""
+    from syda_gym.agents.agent import BaseAlone
+    from syda_gym.agents.interface import Interface
+
+    return BaseAlone(Interface.of(env))

@@ -1,0 +1,1 @@
+"""Does transferability predict? The study, its scores and its picture."""

@@ -1,0 +1,1 @@
+"""Two recordings of one action become paired frames: matched, aligned, checked; fits no mapping."""

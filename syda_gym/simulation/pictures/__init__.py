@@ -1,0 +1,1 @@
+"""Pictures and films of robots and operators; looks at worlds and moves nothing."""

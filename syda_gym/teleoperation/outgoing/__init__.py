@@ -1,0 +1,1 @@
+"""Where commands go: simulated and real robots, the network, a list."""

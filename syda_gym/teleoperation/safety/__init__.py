@@ -1,0 +1,1 @@
+"""What every command has to pass: limits, self-collision, watchdog, the way home."""

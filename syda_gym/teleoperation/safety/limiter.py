@@ -1,0 +1,127 @@
+"""CommandLimiter: the last gate before a robot: joint limits, coupled limits and joint speeds hold in every command."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.kinematics.coupled import coupled_range
+from syda_gym.embodiments.robot import CoupledLimit, Robot
+from syda_gym.errors import OptionError
+
+__all__ = ["UNKNOWN_SPEED", "CommandLimiter"]
+
+UNKNOWN_SPEED = 2.0
+"""Speed limit [rad/s] of a joint whose URDF names none."""
+
+# Keeps the step below speed * dt after the rounding of adding it to the angle and subtracting it again.
+_ROUNDING = 1.0 - 1e-9
+_HALVINGS = 20
+
+
+class CommandLimiter:
+    """Moves from one allowed command towards a wanted one, as far as limits and speeds permit.
+
+    Given a previous command within all limits, the result is within all limits, and no joint moves faster than
+    ``fraction * speed``. Where the two clash, because a joint's range shrinks faster than the joint may move, the joint
+    that governs the range moves less.
+
+    Args:
+        robot: whose limits.
+        fraction: share of the speed limits that may be used, in (0, 1].
+
+    Raises:
+        OptionError: ``fraction`` is not in (0, 1].
+    """
+
+    def __init__(self, robot: Robot, fraction: float = 1.0) -> None:
+        if not 0.0 < fraction <= 1.0:
+            raise OptionError(f"speed fraction must be in (0, 1], got {fraction}")
+        self.robot = robot
+        self.lower, self.upper = robot.lower, robot.upper
+        self.speed: FloatArray = fraction * np.where(np.isfinite(robot.speed), robot.speed, UNKNOWN_SPEED)
+        names = robot.joint_names
+        self._coupled = tuple(
+            _Coupled(names.index(row.joint), names.index(row.by), row)
+            for row in robot.description.coupled_limits
+            if row.joint in names and row.by in names
+        )
+        self._range = self.lower.tolist(), self.upper.tolist()
+
+    def start(self, angles: FloatArray) -> FloatArray:
+        """The allowed command nearest to ``angles`` ``(n,)`` [rad]; where a run begins."""
+        return np.ascontiguousarray(self.robot.clamp(angles)[0])
+
+    def move(self, previous: FloatArray, wanted: FloatArray, dt: float, factor: float = 1.0) -> FloatArray:
+        """The next command.
+
+        Args:
+            previous: the last command ``(n,)`` [rad], within all limits.
+            wanted: where to go ``(n,)`` [rad], finite.
+            dt: time since the last command [s]; nothing moves if it is not positive.
+            factor: slows all joints, in [0, 1].
+
+        Returns:
+            A new array ``(n,)`` [rad].
+        """
+        time = max(dt, 0.0) * min(max(factor, 0.0), 1.0) * _ROUNDING
+        # Plain floats: for a handful of joints numpy would spend its time on calling.
+        before, steps, result = previous.tolist(), (self.speed * time).tolist(), []
+        for start, goal, step, low, high in zip(before, wanted.tolist(), steps, *self._range, strict=True):
+            value = start + min(max(goal - start, -step), step)
+            result.append(min(max(value, low), high))
+        if self._coupled:
+            for row in self._coupled:
+                row.apply(before, result, steps[row.joint])
+            if not all(row.holds(result) for row in self._coupled):  # couplings that depend on each other
+                result = before
+        return np.array(result)
+
+    def allows(self, angles: FloatArray) -> bool:
+        """Whether ``angles`` ``(n,)`` [rad] lie within all limits."""
+        inside = bool(((angles >= self.lower) & (angles <= self.upper)).all())
+        return inside and all(row.holds(angles.tolist()) for row in self._coupled)
+
+
+@dataclass(frozen=True, eq=False)
+class _Coupled:
+    """One coupled limit in plain floats: two scalar interpolations cost less than one numpy call."""
+
+    joint: int
+    by: int
+    row: CoupledLimit
+
+    def range(self, governor: float) -> tuple[float, float]:
+        """Lower and upper limit of the joint at an angle of its governor."""
+        return coupled_range(governor, self.row.at, self.row.lower, self.row.upper)
+
+    def holds(self, q: Sequence[float]) -> bool:
+        low, high = self.range(q[self.by])
+        return low - 1e-12 <= q[self.joint] <= high + 1e-12
+
+    def apply(self, previous: Sequence[float], q: list[float], slack: float) -> None:
+        """Moves the joint into its range; if it is too slow for that, holds the governor back.
+
+        Args:
+            previous: the last command.
+            q: the next one, changed in place.
+            slack: how far the joint may move.
+        """
+        value, governor, before = q[self.joint], q[self.by], previous[self.joint]
+        low, high = self.range(governor)
+        inside = min(max(value, low), high)
+        if abs(inside - before) > slack:
+            start = previous[self.by]
+            share, width = 0.0, 1.0
+            for _ in range(_HALVINGS):
+                width *= 0.5
+                low, high = self.range(start + (share + width) * (governor - start))
+                if abs(min(max(value, low), high) - before) <= slack:
+                    share += width
+            q[self.by] = start + share * (governor - start)
+            low, high = self.range(q[self.by])
+            inside = min(max(value, low), high)
+        q[self.joint] = inside

@@ -1,0 +1,327 @@
+"""SelfCollision: would the robot touch itself? The URDF's collision shapes, checked by pinocchio and coal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.robot import Robot
+from syda_gym.errors import OptionError
+from syda_gym.teleoperation.safety.clearance import Clearance
+
+__all__ = ["SelfCollision"]
+
+_SAMPLES = 256
+_SMALL = 1e-3  # rad
+_STEP = 0.1  # rad; how far apart the tested poses of a way may be
+_FEW = 24  # pairs; looking at more of them one by one takes as long as looking at all
+_ALWAYS = 0.5  # pairs that touch in more than this share of random poses overlap by construction
+
+
+class SelfCollision:
+    """Checks command steps against the robot's own body.
+
+    The joints that are not arm joints are locked at rest. Pairs of shapes that are neighbours in the kinematic tree,
+    that the description disables, that already touch at rest or that touch in most random poses say nothing about a
+    pose and are left out, as in the set-up assistants of motion planners.
+
+    Args:
+        robot: whose shapes.
+        margin: distance [m] below which two links count as touching.
+
+    Attributes:
+        available: false when the URDF has no collision shape that could be read; then nothing is checked, and
+            ``why`` says so.
+        why: empty, or the reason for not checking.
+        pairs: number of pairs of shapes that are checked.
+        ignored: names of links whose shapes overlap by construction or touch at rest, left out for that.
+
+    Raises:
+        OptionError: ``margin`` is negative.
+    """
+
+    def __init__(self, robot: Robot, margin: float = 0.005) -> None:
+        if margin < 0.0:
+            raise OptionError(f"self-collision margin must not be negative, got {margin} m")
+        self.robot = robot
+        self.margin = margin
+        self.why = ""
+        self.pairs = 0
+        self.ignored: tuple[tuple[str, str], ...] = ()
+        import pinocchio
+
+        self._pin: Any = pinocchio
+        try:
+            self._model, self._shapes = _arm_model(robot)
+        except (ValueError, RuntimeError) as error:  # meshes that are missing or broken
+            self.why = f"self-collision is not checked: {str(error).splitlines()[0]}"
+        else:
+            self._index, self._turns = _indices(self._model, robot)
+            self._configuration = np.zeros(self._model.nq)
+            self._choose_pairs()
+            self._clearance = Clearance(robot, self._model, self._shapes, margin)
+            self.pairs = len(self._shapes.collisionPairs)
+            if not self.pairs:
+                self.why = f"self-collision is not checked: {robot.urdf.name} has no collision shapes on two links"
+
+    @property
+    def available(self) -> bool:
+        """Whether anything is checked."""
+        return not self.why
+
+    def touches(self, angles: FloatArray) -> bool:
+        """Whether any pair of links is nearer than the margin at ``angles`` ``(n,)`` [rad]."""
+        if not self.available:
+            return False
+        return self._touches(angles, self._clearance.suspects(angles))
+
+    def measure(self, angles: FloatArray) -> None:
+        """Measures all distances at ``angles`` ``(n,)`` [rad], where that helps: checks near there become cheap."""
+        if self.available and self._clearance.wants(angles):
+            self._pin.computeDistances(self._model, self._data, self._shapes, self._shape_data, self._full(angles))
+            self._clearance.note(angles, [result.min_distance for result in self._shape_data.distanceResults])
+
+    def ignores_far_links(self) -> bool:
+        """Whether a pair was left out because it touches at rest although the links are no near relatives.
+
+        Then the rest pose is a bad one rather than the shapes too coarse: an arm that rests on the body, say.
+        """
+        if not self.available:
+            return False
+        joints = {self._model.frames[s.parentFrame].name: s.parentJoint for s in self._shapes.geometryObjects}
+        return any(self._steps(joints[a], joints[b]) > 3 for a, b in self.ignored)
+
+    def _steps(self, first: int, second: int) -> int:
+        """Number of joints between two joints of the tree."""
+        parents = self._model.parents
+        above: dict[int, int] = {}
+        count = 0
+        while True:
+            above[first] = count
+            if first == 0:
+                break
+            first, count = parents[first], count + 1
+        count = 0
+        while second not in above:
+            second, count = parents[second], count + 1
+        return above[second] + count
+
+    def free_path(self, start: FloatArray, end: FloatArray) -> bool:
+        """Whether the straight way from ``start`` (known to be free) to ``end`` is free, tested every 0.1 rad."""
+        return not self.available or self._is_free(start, end, self._clearance.suspects(start, end))
+
+    def allowed(self, start: FloatArray, end: FloatArray) -> FloatArray:
+        """The part of a step that stays free: all of it, or arm by arm and joint by joint what can still move.
+
+        So an arm that meets the body slides along it rather than sticking to it.
+
+        Args:
+            start: the last command ``(n,)`` [rad], free.
+            end: the next command ``(n,)`` [rad].
+
+        Returns:
+            ``end`` itself, or a new array between ``start`` and ``end``.
+        """
+        if not self.available:
+            return end
+        suspects = self._clearance.suspects(start, end)
+        if self._is_free(start, end, suspects):
+            return end
+        result = start.copy()
+        for part in self.robot.arm_slices:
+            if self._try(result, end, part, suspects):
+                continue
+            for joint in range(part.start, part.stop):
+                self._try(result, end, slice(joint, joint + 1), suspects)
+        return result
+
+    def _try(self, pose: FloatArray, end: FloatArray, part: slice, suspects: list[int] | None) -> bool:
+        """Moves part of a pose to ``end`` if the way is free; steps too small to matter are not worth a check."""
+        if float(np.abs(end[part] - pose[part]).max()) < _SMALL:
+            return True
+        moved = pose.copy()
+        moved[part] = end[part]
+        if not self._is_free(pose, moved, suspects):
+            return False
+        pose[part] = end[part]
+        return True
+
+    def _is_free(self, start: FloatArray, end: FloatArray, suspects: list[int] | None) -> bool:
+        """As ``free_path``, looking at the suspected pairs only, at all if there is no telling."""
+        if suspects == []:
+            return True
+        farthest = float(np.abs(end - start).max())
+        if farthest <= _STEP:
+            return not self._touches(end, suspects)
+        count = math.ceil(farthest / _STEP)
+        return not any(self._touches(start + (end - start) * (i / count), suspects) for i in range(count, 0, -1))
+
+    def _touches(self, angles: FloatArray, suspects: list[int] | None) -> bool:
+        everything = self._model, self._data, self._shapes, self._shape_data, self._full(angles)
+        if suspects is None or len(suspects) > _FEW:
+            return bool(self._pin.computeCollisions(*everything, True))
+        if not suspects:
+            return False
+        self._pin.updateGeometryPlacements(*everything)
+        look = self._pin.computeCollision
+        return any(look(self._shapes, self._shape_data, pair) for pair in suspects)
+
+    def _full(self, angles: FloatArray) -> FloatArray:
+        self._configuration[self._index] = angles
+        for joint, at in self._turns:  # a continuous joint is a cosine and a sine in pinocchio
+            self._configuration[at] = math.cos(angles[joint])
+            self._configuration[at + 1] = math.sin(angles[joint])
+        return self._configuration
+
+    def _hits(self, angles: FloatArray) -> list[bool]:
+        self._pin.computeCollisions(self._model, self._data, self._shapes, self._shape_data, self._full(angles), False)
+        return [result.isCollision() for result in self._shape_data.collisionResults]
+
+    def _choose_pairs(self) -> None:
+        shapes = self._shapes
+        shapes.addAllCollisionPairs()
+        disabled = {frozenset(pair) for pair in self.robot.description.disabled_collisions}
+        names = [self._model.frames[shape.parentFrame].name for shape in shapes.geometryObjects]
+        joints = [shape.parentJoint for shape in shapes.geometryObjects]
+        parents = self._model.parents
+        within_reach = self._within_reach()
+        self._keep(
+            [
+                within_reach(pair.first, pair.second)
+                and frozenset((names[pair.first], names[pair.second])) not in disabled
+                and parents[joints[pair.first]] != joints[pair.second]
+                and parents[joints[pair.second]] != joints[pair.first]
+                for pair in shapes.collisionPairs
+            ]
+        )
+        rng = np.random.default_rng(0)
+        poses = self.robot.clamp(rng.uniform(self.robot.lower, self.robot.upper, (_SAMPLES, len(self.robot.lower))))
+        frequency = np.mean([self._hits(pose) for pose in poses], axis=0)
+        # Pairs within the margin at rest would never let the robot start.
+        left_out = (frequency > _ALWAYS) | np.array(self._hits(self.robot.rest), dtype=bool)
+        self.ignored = tuple(
+            sorted(
+                {
+                    (names[pair.first], names[pair.second])
+                    for pair, out in zip(shapes.collisionPairs, left_out, strict=True)
+                    if out
+                }
+            )
+        )
+        self._keep(list(~left_out))
+        # The check ends at the first hit; pairs that touch often come first.
+        self._keep([True] * int((~left_out).sum()), np.argsort(-frequency[~left_out], kind="stable").tolist())
+
+    def _within_reach(self) -> Callable[[int, int], bool]:
+        """Tells which pairs can meet at all: each shape stays in a ball about the first joint of its arm.
+
+        The ball's radius is the length of the arm's links up to the shape plus the shape's own size, whatever the joint
+        angles, so that nothing is lost by leaving out pairs whose balls are apart.
+        """
+        model, zero = self._model, np.zeros(3)
+        lengths, roots = [0.0], [0]
+        for joint in range(1, model.njoints):
+            parent = model.parents[joint]
+            roots.append(joint if parent == 0 else roots[parent])
+            step = float(np.linalg.norm(model.jointPlacements[joint].translation))
+            lengths.append(0.0 if parent == 0 else lengths[parent] + step)
+        balls = []
+        for shape in self._shapes.geometryObjects:
+            shape.geometry.computeLocalAABB()
+            middle = shape.placement.act(np.array(shape.geometry.aabb_center))
+            radius = float(shape.geometry.aabb_radius)
+            if shape.parentJoint == 0:
+                balls.append((middle, radius))
+            else:
+                root = model.jointPlacements[roots[shape.parentJoint]].act(zero)
+                balls.append((root, lengths[shape.parentJoint] + float(np.linalg.norm(middle)) + radius))
+
+        def meet(first: int, second: int) -> bool:
+            (a, r), (b, s) = balls[first], balls[second]
+            return bool(np.linalg.norm(a - b) <= r + s + self.margin)
+
+        return meet
+
+    def _keep(self, chosen: list[bool], order: list[int] | None = None) -> None:
+        """Keeps only the chosen pairs of shapes, perhaps in another order, and renews what depends on them."""
+        # Indices first: the list's elements are references into a vector that changes under removal.
+        pairs = [(pair.first, pair.second) for pair in self._shapes.collisionPairs]
+        self._shapes.removeAllCollisionPairs()
+        for index in range(len(pairs)) if order is None else order:
+            if chosen[index]:
+                self._shapes.addCollisionPair(self._pin.CollisionPair(*pairs[index]))
+        self._data = self._pin.Data(self._model)
+        self._shape_data = self._pin.GeometryData(self._shapes)
+        for request in self._shape_data.collisionRequests:
+            request.security_margin = self.margin
+
+
+def _arm_model(robot: Robot) -> tuple[Any, Any]:
+    """Pinocchio's model and collision shapes with every joint but the arms' locked at rest."""
+    import pinocchio
+
+    model = pinocchio.buildModelFromUrdf(str(robot.urdf))
+    folders = [str(folder) for folder in robot.urdf.parents[:5]]
+    shapes = pinocchio.buildGeomFromUrdf(model, str(robot.urdf), pinocchio.GeometryType.COLLISION, package_dirs=folders)
+    configuration = pinocchio.neutral(model)
+    for name, angle in robot.description.rest.items():
+        if model.existJointName(name) and model.joints[model.getJointId(name)].nq == 1:
+            configuration[model.joints[model.getJointId(name)].idx_q] = angle
+    locked = [model.getJointId(name) for name in model.names if name not in ("universe", *robot.joint_names)]
+    _join_capsules(shapes)
+    for shape in shapes.geometryObjects:
+        _convex(shape)
+    reduced, kept = pinocchio.buildReducedModel(model, shapes, locked, configuration)
+    return reduced, kept
+
+
+def _join_capsules(shapes: Any) -> None:
+    """Makes one capsule of a cylinder and the two spheres at its ends, which is how URDF writes a capsule."""
+    import coal
+
+    # Plain copies first: the list's elements are references into a vector that changes under removal.
+    balls = {
+        shape.name: (shape.parentFrame, float(shape.geometry.radius), np.array(shape.placement.translation))
+        for shape in shapes.geometryObjects
+        if isinstance(shape.geometry, coal.Sphere)
+    }
+    needless: set[str] = set()
+    for shape in shapes.geometryObjects:
+        if not isinstance(shape.geometry, coal.Cylinder):
+            continue
+        radius, half = float(shape.geometry.radius), float(shape.geometry.halfLength)
+        ends = [shape.placement.act(np.array([0.0, 0.0, sign * half])) for sign in (1.0, -1.0)]
+        caps = [
+            name
+            for end in ends
+            for name, (frame, size, centre) in balls.items()
+            if frame == shape.parentFrame and abs(size - radius) < 1e-6 and np.linalg.norm(centre - end) < 1e-6
+        ]
+        if len(caps) >= 2:
+            shape.geometry = coal.Capsule(radius, 2.0 * half)
+            needless.update(caps)
+    for name in needless:
+        shapes.removeGeometryObject(name)
+
+
+def _convex(shape: Any) -> None:
+    """Replaces a mesh by its convex hull, which is faster to check and never smaller."""
+    if hasattr(shape.geometry, "buildConvexHull"):
+        shape.geometry.buildConvexHull(True, "Qt")
+        if shape.geometry.convex is not None:
+            shape.geometry = shape.geometry.convex
+
+
+def _indices(model: Any, robot: Robot) -> tuple[list[int], list[tuple[int, int]]]:
+    """Where each arm joint's angle goes in pinocchio's configuration, and which joints are continuous."""
+    index, turns = [], []
+    for column, name in enumerate(robot.joint_names):
+        joint = model.joints[model.getJointId(name)]
+        index.append(joint.idx_q)
+        if joint.nq == 2:
+            turns.append((column, joint.idx_q))
+    return index, turns
