@@ -28,7 +28,7 @@ lowest: $(BASE)
 	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct \
 		-e ".[dev,train,ik,bvh,live,export]"
 	$(LOWEST)/bin/python -m pytest -p no:cacheprovider tests/embodiments tests/motions tests/mappings tests/simulation \
-		tests/envs tests/teleoperation tests/agents tests/test_cli.py
+		tests/envs tests/teleoperation tests/agents tests/cli
 
 lint: $(DEVELOPMENT)
 	$(BIN)/ruff check .

@@ -27,6 +27,7 @@ ROOMS = {
     "agents": "Agents",
     "evaluation": "Evaluation",
     "teleoperation": "Teleoperation",
+    "cli": "Command line",
     "errors": "Errors",
     "files": "Files",
 }

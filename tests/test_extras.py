@@ -20,7 +20,7 @@ FEATURES = {
     ),
     "export": (
         "onnx",
-        "from syda_gym.agents import export; export.export_onnx(None, 'agent.onnx')",
+        "from syda_gym.agents.deployment import export; export.export_onnx(None, 'agent.onnx')",
     ),
     "bvh": (
         "pymotion",

@@ -34,7 +34,7 @@ QUICK = {
 @pytest.fixture
 def in_process(monkeypatch):
     """Computes cells in this process: as fast as can be, for tests of what surrounds the work."""
-    from syda_gym.evaluation.benchmark import pools, runner
+    from syda_gym.evaluation.benchmark import execution, pools
 
     class Here(pools.Pool):
         size = 1
@@ -62,7 +62,7 @@ def in_process(monkeypatch):
         opened.append(Here(motions))
         return opened[-1]
 
-    monkeypatch.setattr(runner, "make_pool", make)
+    monkeypatch.setattr(execution, "make_pool", make)
     return opened
 
 
@@ -341,9 +341,9 @@ def test_a_failed_cell_is_reported_with_its_trace_and_the_rest_goes_on(
 
 
 def test_a_full_disk_loses_no_finished_cell(small_motions, tmp_path, in_process, monkeypatch):
-    from syda_gym.evaluation.benchmark import runner
+    from syda_gym.evaluation.benchmark import execution
 
-    whole, written = runner.write_json, []
+    whole, written = execution.write_json, []
 
     def full(path, value):
         if len(written) == 2:
@@ -351,10 +351,10 @@ def test_a_full_disk_loses_no_finished_cell(small_motions, tmp_path, in_process,
         written.append(path)
         return whole(path, value)
 
-    monkeypatch.setattr(runner, "write_json", full)
+    monkeypatch.setattr(execution, "write_json", full)
     with pytest.raises(StorageError, match="No space left"):
         run_benchmark(BenchmarkConfig.of(QUICK), tmp_path, motions=small_motions)
-    monkeypatch.setattr(runner, "write_json", whole)
+    monkeypatch.setattr(execution, "write_json", whole)
     run_benchmark(BenchmarkConfig.of(QUICK), tmp_path, motions=small_motions)
     assert in_process[-1].computed == 4
 
