@@ -99,7 +99,7 @@ def _actions(motions: str, names: Sequence[str]) -> set[str]:
     for name in names:
         if name not in known:
             raise typer.BadParameter(
-                f"{motions} has no action {name!r}; {nearest_name(name, known)}", param_hint="--held-out"
+                f"{motions} has no action {name!r}; {nearest_name(name, known)}", param_hint="'--held-out'"
             )
     return known
 
@@ -218,7 +218,9 @@ def evaluate(
     if as_json:
         print_json({"episodes": count, "agents": {name: figures.as_dict() for name, figures in means.items()}})
         return
-    _print_figures(means, f"Means over {count} episodes, {physics}, disturbances {scene.disturbances}")
+    _print_figures(
+        means, f"Means over {count} episode{'s' * (count > 1)}, {physics}, disturbances {scene.disturbances}"
+    )
 
 
 @with_scene

@@ -13,6 +13,7 @@ from syda_gym.cli.names import FIGURES, ticked
 from syda_gym.cli.options import (
     AgentOption,
     BodiesArgument,
+    CountOption,
     DisturbancesOption,
     JsonOption,
     MethodOption,
@@ -139,9 +140,9 @@ def export_episodes(
     bodies = route_of(route) or ends_of(operator, robot)
     first, last = ends_of(operator, robot, route)
     if bodies == "auto":
-        raise typer.BadParameter("a data set has one chain; name its bodies", param_hint="--route")
+        raise typer.BadParameter("a data set has one chain; name its bodies", param_hint="'--route'")
     if (first, last) != (bodies[0], bodies[-1]):
-        raise typer.BadParameter(f"{route} does not lead from {first} to {last}", param_hint="--route")
+        raise typer.BadParameter(f"{route} does not lead from {first} to {last}", param_hint="'--route'")
     named, chosen = mapping_of(method, preset, None)
     stored = export_minari(
         name,
@@ -161,7 +162,7 @@ def suggest(
     bodies: BodiesArgument = None,
     pairs: PairOption = None,
     motions: MotionsOption = "embedded",
-    count: Annotated[int, typer.Option("--count", help="How many suggestions.", min=1)] = 5,
+    count: CountOption = 5,
     results: Annotated[
         Path | None, typer.Option("--benchmark", help="A benchmark with a sample-efficiency curve.")
     ] = None,

@@ -17,6 +17,7 @@ from syda_gym.cli.names import ACTING, CELLS, LEVELS, METHODS, RIVALS, SHIPPED_A
 from syda_gym.errors import nearest_name
 
 __all__ = [
+    "address",
     "agents",
     "between",
     "bundle",
@@ -194,6 +195,25 @@ def named_or_file(known: Collection[str], what: str, *endings: str) -> Check:
                 raise typer.BadParameter(f"no file {value}; name one, or one of {', '.join(known)}")
             return value
         raise typer.BadParameter(f"unknown {what} {value!r}; {nearest_name(value, known)}, or a file {endings[0]}")
+
+    return check
+
+
+def address(written: Sequence[str], what: str) -> Check:
+    """The kind of a source or sink, before the first colon.
+
+    Args:
+        written: how they are written, for example ``udp:PORT``.
+        what: ``"source"`` or ``"sink"``.
+    """
+    kinds = {text.partition(":")[0] for text in written}
+
+    def check(values: Any) -> Any:
+        for text in [values] if isinstance(values, str) else values or ():
+            kind = text.partition(":")[0]
+            if kind not in kinds:
+                raise typer.BadParameter(f"unknown {what} {text!r}; {nearest_name(kind, kinds)}")
+        return values
 
     return check
 

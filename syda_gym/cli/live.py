@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from syda_gym.cli import checks
-from syda_gym.cli.names import SINKS, ticked
 from syda_gym.cli.options import (
     ActionOption,
     AxesOption,
@@ -240,9 +239,7 @@ def record(
     action: ActionOption = None,
     takes: Annotated[int, typer.Option(help="Takes per action.", min=1)] = 1,
     source: SourceOption = "udp:9870",
-    sink: Annotated[
-        list[str] | None, typer.Option("--sink", help=f"What shows the robot to the person: {ticked(SINKS)}.")
-    ] = None,
+    sink: SinkOption = None,
     calibration: CalibrationOption = 2.0,
     axes: AxesOption = "kinect",
     countdown: Annotated[
@@ -253,7 +250,7 @@ def record(
 ) -> None:
     """Record a pair: the robot plays its motions, a person mimics it, and a data set for `fit` comes out.
 
-    Without `--action` one take of each action is played.
+    Without `--action` one take of each action is played; without `--sink` a window shows the robot.
     """
     from syda_gym.motions import write_dataset
     from syda_gym.teleoperation.addresses import make_sink, make_source, read_token

@@ -127,9 +127,9 @@ def _motions_pair(
     """Pair an operator's recordings with a robot's prompts by name, align them in time, and judge every action."""
     from syda_gym.motions import load_motions, operator_clips, pair_session, write_dataset
 
-    played = load_motions(prompts)
+    played = load_motions(prompts).clips(robot)
     session = pair_session(
-        operator_clips(operators), played.clips(robot), fps=fps, max_lag=max_lag, same_clock=same_clock, name=out.name
+        operator_clips(operators), played, fps=fps, max_lag=max_lag, same_clock=same_clock, name=out.name
     )
     write_dataset(session.motions, out)
     rows = []

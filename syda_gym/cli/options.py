@@ -33,6 +33,7 @@ __all__ = [
     "AxesOption",
     "BodiesArgument",
     "CalibrationOption",
+    "CountOption",
     "DefinitionOption",
     "DisturbancesOption",
     "FpsOption",
@@ -168,6 +169,7 @@ DefinitionOption = Annotated[
         callback=checks.one_of(DEFINITIONS, "definition"),
     ),
 ]  # fmt: skip
+CountOption = Annotated[int, typer.Option("--count", help="How many to list at most.", min=1)]
 MaxHopsOption = Annotated[int | None, typer.Option("--max-hops", help="Longest chain, in links.", min=1)]
 PhysicsHzOption = Annotated[
     float,
@@ -181,9 +183,17 @@ FpsOption = Annotated[
     float | None,
     typer.Option("--fps", help="Frames per second.", callback=checks.between(0.0, 1000.0, "Hz", open_low=True)),
 ]
-SourceOption = Annotated[str, typer.Option("--source", help=f"Where frames come from: {ticked(SOURCES)}.")]
+SourceOption = Annotated[
+    str,
+    typer.Option(
+        "--source", help=f"Where frames come from: {ticked(SOURCES)}.", callback=checks.address(SOURCES, "source")
+    ),
+]
 SinkOption = Annotated[
-    list[str] | None, typer.Option("--sink", help=f"Where commands go, repeatable: {ticked(SINKS)}.")
+    list[str] | None,
+    typer.Option(
+        "--sink", help=f"Where commands go, repeatable: {ticked(SINKS)}.", callback=checks.address(SINKS, "sink")
+    ),
 ]
 AxesOption = Annotated[
     str,
@@ -202,7 +212,7 @@ TokenOption = Annotated[
 
 def route_of(text: str) -> str | tuple[str, ...]:
     """What ``--route`` gave, as the library takes it: ``"auto"`` or the bodies."""
-    return text if text in ("", "auto") else tuple(text.split(","))
+    return text if text in ("", "auto") else tuple(text.replace(">", ",").split(","))
 
 
 def ends_of(operator: str | None, robot: str | None, route: str = "auto") -> tuple[str, str]:
@@ -229,20 +239,20 @@ def mapping_of(method: str | None, preset: str | None, mapping: Path | None) -> 
     if mapping is not None:
         if method or preset:
             raise typer.BadParameter(
-                "a stored mapping has its method; leave --method and --preset out", param_hint="--mapping"
+                "a stored mapping has its method; leave --method and --preset out", param_hint="'--mapping'"
             )
         if not mapping.exists():
             names = nearest_name(str(mapping), METHODS)
             raise typer.BadParameter(
-                f"nothing is stored in {mapping}; a method is named with --method: {names}", param_hint="--mapping"
+                f"nothing is stored in {mapping}; a method is named with --method: {names}", param_hint="'--mapping'"
             )
         return str(mapping), None
     name, _, inner = (method or "syda").partition(":")
     if preset and inner and preset != inner:
-        raise typer.BadParameter(f"--method {method} and --preset {preset} name two presets", param_hint="--preset")
+        raise typer.BadParameter(f"--method {method} and --preset {preset} name two presets", param_hint="'--preset'")
     chosen = inner or preset or None
     if chosen is not None and chosen not in METHODS[name]:
         raise typer.BadParameter(
-            f"method {name!r} has no preset {chosen!r}; {nearest_name(chosen, METHODS[name])}", param_hint="--preset"
+            f"method {name!r} has no preset {chosen!r}; {nearest_name(chosen, METHODS[name])}", param_hint="'--preset'"
         )
     return name, chosen

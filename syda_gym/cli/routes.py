@@ -10,6 +10,7 @@ from syda_gym.cli import checks
 from syda_gym.cli.names import PREDICTORS, ticked
 from syda_gym.cli.options import (
     BodiesArgument,
+    CountOption,
     DefinitionOption,
     JsonOption,
     MaxHopsOption,
@@ -96,7 +97,7 @@ def route(
             "--predictor", help=f"What decides: {ticked(PREDICTORS)}.", callback=checks.one_of(PREDICTORS, "predictor")
         ),
     ] = "T",
-    count: Annotated[int, typer.Option("--count", help="How many routes to list.", min=1)] = 5,
+    count: CountOption = 5,
     noise: Annotated[bool, typer.Option("--noise", help="Take alpha from the noise of the recordings.")] = False,
     suggest: Annotated[bool, typer.Option("--suggest", help="Also say which pair to record next.")] = False,
     picture: PictureOption = None,
@@ -106,6 +107,7 @@ def route(
 
     Fitted pairs are those of `--pair`, by default all that were recorded together in the motions.
     """
+    from syda_gym.embodiments import catalog
     from syda_gym.evaluation.prediction.tables import routes_table, suggestions_table
     from syda_gym.files import write_bytes
     from syda_gym.routes import routing, suggestion
@@ -126,6 +128,10 @@ def route(
         from syda_gym.routes.noise import alpha_from_noise
 
         options["alpha"] = alpha_from_noise(motion_noise(load_motions(motions)))
+    known = {getattr(body, "name", body) for pair in fitted for body in pair}
+    for name in (source, target):
+        if name not in known:
+            catalog.resolve(name)  # a body that nobody knows is told as such, not as one without a fitted pair
     best = routing.best_route(source, target, fitted, kind, **options)
     ranked = routing.ranked_routes(source, target, fitted, kind, count=count, **options)
     routes = [best, *(other for other in ranked if other.bodies != best.bodies)][:count]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import typer
 from typer.core import TyperCommand
 
-from syda_gym.cli.names import CONFIGS, METHODS
+from syda_gym.cli.names import CONFIGS, METHODS, PRESETS
 
 __all__ = ["OLD_SPELLINGS", "Old", "Program", "rewritten"]
 
@@ -46,11 +47,17 @@ def _is_method(value: str) -> bool:
     return value.partition(":")[0] in METHODS and not Path(value).exists()
 
 
+def _is_config(value: str) -> bool:
+    """Whether ``--preset`` of ``train`` means its hyper-parameters, misspelt ones included, and not a mapping's preset."""
+    near = get_close_matches(value, [*CONFIGS, *PRESETS], n=1)
+    return value in CONFIGS or bool(near and value not in PRESETS and near[0] in CONFIGS)
+
+
 OLD_SPELLINGS: tuple[Old, ...] = (
     Old("route", "--from", "--operator"),
     Old("route", "--to", "--robot"),
     *(Old(command, "--mapping", "--method", _is_method) for command in ("train", "evaluate", "play", "teleop")),
-    Old("train", "--preset", "--config", lambda value: value in CONFIGS),
+    Old("train", "--preset", "--config", _is_config),
     Old("export-episodes", "--disturbance", "--disturbances"),
     Old("reproduce-paper", "--method", "--method", lambda value: "/" in value, lambda value: value.replace("/", ":")),
     Old("record", "--prompts", "--motions"),
@@ -82,7 +89,7 @@ class _Command(TyperCommand):
                     changes += change
             for before, after in dict.fromkeys(changes):
                 typer.echo(
-                    f"warning: {before} is now written {after}; the old spelling goes in a later version", err=True
+                    f"warning: write {after} instead of {before}, which the next version will not know", err=True
                 )
             args = words
         return super().parse_args(ctx, args)
