@@ -49,7 +49,7 @@ def _robot_add(
     right: Annotated[str | None, typer.Option(help="Link at the end of the right arm.")] = None,
     torso: Annotated[str | None, typer.Option(help="Link in whose frame landmarks are expressed.")] = None,
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite a robot that was added before.")] = False,
-    suggest: Annotated[bool, typer.Option(help="Say which pair to record next.")] = True,
+    suggest: Annotated[bool, typer.Option(help="Also say which pair to record next.")] = True,
 ) -> None:
     """Find arms, hands and torso of a URDF, propose landmarks and a rest pose, and make it known by name."""
     import math

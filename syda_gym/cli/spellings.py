@@ -48,7 +48,7 @@ def _is_method(value: str) -> bool:
 
 
 def _is_config(value: str) -> bool:
-    """Whether ``--preset`` of ``train`` means its hyper-parameters, misspelt ones included, and not a mapping's preset."""
+    """Whether ``--preset`` of ``train`` means its hyper-parameters, misspelt ones too, and no mapping's preset."""
     near = get_close_matches(value, [*CONFIGS, *PRESETS], n=1)
     return value in CONFIGS or bool(near and value not in PRESETS and near[0] in CONFIGS)
 

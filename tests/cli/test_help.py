@@ -59,11 +59,7 @@ def test_values_stand_in_every_help(words):
         assert parameter.help, f"{parameter.name} has no help"
 
 
-def test_help_is_printed_for_every_command():
-    for words in ALL:
-        done = CliRunner(env={"COLUMNS": "200"}).invoke(app, [*words, "--help"])
-        assert done.exit_code == 0, done.output
-        assert "Usage" in done.output
+def test_values_are_printed():
     shown = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["train", "--help"]).output
     assert "kernel_ridge" in shown
     assert "noise+latency" in shown
