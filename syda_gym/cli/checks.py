@@ -266,6 +266,9 @@ def workers(value: str) -> str:
 
 
 def _is_bundle(text: str) -> bool:
+    """Whether it is a bundle, or plainly a path; whether that exists is told where it is read."""
+    if "/" in text or text.endswith((".json", ".safetensors")):
+        return True
     path = Path(text)
     try:
         return bool(path.name) and path.with_suffix(".json").is_file()

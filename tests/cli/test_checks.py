@@ -143,9 +143,10 @@ def test_files_end_as_they_must(tmp_path: Path):
         checks.folder(tmp_path / "file")
 
 
-def test_agents_are_names_or_bundles(tmp_path: Path):
+def test_agents_are_names_or_bundles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.json").touch()
-    assert checks.agents(["kalman", str(tmp_path / "mine"), "adult-pepper-full"])
+    assert checks.agents(["kalman", "mine", "runs/other", "adult-pepper-full"])
     with pytest.raises(typer.BadParameter, match="did you mean 'kalman'"):
         checks.agents("kalmann")
     assert checks.bundle("adult-pepper-lag") == "adult-pepper-lag"

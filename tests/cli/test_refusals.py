@@ -48,6 +48,8 @@ REFUSED = [
     ("train --route adult,kd,pepper", "did you mean 'kid'"),
     ("train --resume", "no checkpoint"),
     ("evaluate kalmann", "did you mean 'kalman'"),
+    ("play runs/missing", "no agent 'runs/missing'"),
+    ("export runs/missing", "runs/missing"),
     ("evaluate lead --physics bulet", "did you mean 'bullet'"),
     ("evaluate lead --reference mappd", "did you mean 'mapped'"),
     ("evaluate lead --physics-hz 100", "--physics-hz"),
