@@ -12,7 +12,6 @@ import socket
 from pathlib import Path
 
 import pytest
-from test_docs import commands
 from typer.testing import CliRunner
 
 import syda_gym
@@ -20,6 +19,7 @@ from syda_gym.cli.main import app
 from syda_gym.files import asset
 from syda_gym.motions import write_dataset
 from tests.motions import recordings
+from tests.test_docs import commands
 
 # Beginning of a command -> why it is not run.
 PARSED = {
