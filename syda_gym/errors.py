@@ -65,17 +65,25 @@ class MissingExtraError(SydaError, ImportError):
         self.extra = extra
 
 
+_MOST_NAMES = 40  # in one message; data sets have hundreds of clips
+
+
 def nearest_name(name: str, known: Iterable[str]) -> str:
     """Says which known name is nearest, for error messages.
 
     Args:
-        name: what the user wrote.
+        name: what the user wrote; its case does not matter.
         known: the names that would have worked.
 
     Returns:
-        A sentence such as ``did you mean 'pepper'? Known: adult, kid, pepper``.
+        A sentence such as ``did you mean 'pepper'? Known: adult, kid, pepper``; of very many names the nearest ones are
+        listed.
     """
     names = sorted(known)
-    close = difflib.get_close_matches(name, names, n=1)
-    hint = f"did you mean {close[0]!r}? " if close else ""
-    return f"{hint}Known: {', '.join(names) or 'none'}"
+    alike = {other.casefold(): other for other in reversed(names)}
+    best = difflib.get_close_matches(name.casefold(), alike, n=1)
+    hint = f"did you mean {alike[best[0]]!r}? " if best else ""
+    if len(names) <= _MOST_NAMES:
+        return f"{hint}Known: {', '.join(names) or 'none'}"
+    near = difflib.get_close_matches(name.casefold(), alike, n=_MOST_NAMES // 2, cutoff=0.0)
+    return f"{hint}Known: {', '.join(sorted(alike[other] for other in near))} and {len(names) - len(near)} more"

@@ -32,7 +32,7 @@ PARSED = {
     "syda-gym export-episodes": "needs the extra data; tests/evaluation/test_minari_export.py",
     "syda-gym reproduce-paper": "needs the paper's recordings; tests/evaluation/test_paper.py",
     "syda-gym transferability --validate": "minutes; tests/evaluation/test_prediction.py",
-    "syda-gym route --from adult --to nao": "fits and plays every link; tests/transferability/test_measured.py",
+    "syda-gym route --operator adult --robot nao": "fits and plays every link; tests/transferability/test_measured.py",
     "syda-gym record": "needs a person; tests/teleoperation/test_recording.py",
     "syda-gym motions pair": "needs recordings of a person; tests/motions/test_session.py",
     "syda-gym teleop --robot nao --source udp:9870 --sink naoqi:tcp://nao.local:9559": "needs a robot; test_naoqi.py",

@@ -12,10 +12,15 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import AgentError
 
-__all__ = ["JOINT_WEIGHT", "Figures", "episode_figures", "figures_of_points", "mean_figures"]
+__all__ = ["JOINT_WEIGHT", "OBJECTIVE", "Figures", "episode_figures", "figures_of_points", "mean_figures"]
 
 JOINT_WEIGHT = 0.05
 """Weight of a milliradian of joint error against a millimetre of landmark error in the objective."""
+
+OBJECTIVE = (
+    f"J = landmark error [mm] + {JOINT_WEIGHT:g} x joint error [mrad] + jitter [mm/frame³]; less of each is better."
+)
+"""What ``J`` is, for below a table."""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from syda_gym.agents.classical.tuning import Tuned, tune
 from syda_gym.agents.figures import Figures
 from syda_gym.agents.interface import Interface
 from syda_gym.agents.predictor.predictor_training import PredictorConfig, train_predictor
+from syda_gym.agents.residual.checkpoint import load_checkpoint
 from syda_gym.agents.residual.config import ResidualConfig
 from syda_gym.agents.residual.residual_training import train_residual
 from syda_gym.agents.rollout import EpisodeResult, evaluate, mean_of
@@ -89,9 +90,11 @@ def train_agent(
     Raises:
         SydaError: bad options, nothing to resume, a bundle that does not fit.
     """
-    ground = Ground(options)
     settings = config or ResidualConfig()
     folder = Path(out)
+    if resume and isinstance(settings, ResidualConfig):
+        load_checkpoint(folder / "checkpoint.safetensors")  # before minutes of fitting and recording are spent
+    ground = Ground(options)
     if isinstance(settings, PredictorConfig):
         below = find_agent(base, ground.interface)
         filters = below.base if isinstance(below, Lead) and below.base is not None else below

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import wraps
 from inspect import Parameter, signature
@@ -12,58 +11,97 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from syda_gym.cli.shared import console
+from syda_gym.cli import checks
+from syda_gym.cli.names import ALGORITHMS, CONFIGS, KINDS, PHYSICS, REFERENCES, ticked
+from syda_gym.cli.options import (
+    AGENT_HELP,
+    DisturbancesOption,
+    HeldOutOption,
+    JsonOption,
+    MappingOption,
+    MethodOption,
+    MotionsOption,
+    OperatorOption,
+    PhysicsHzOption,
+    PresetOption,
+    RobotOption,
+    RouteOption,
+    SeedOption,
+    ends_of,
+    mapping_of,
+    route_of,
+)
+from syda_gym.cli.shared import bar, print_json, say_written, show_table
 
 if TYPE_CHECKING:
     from syda_gym.agents.figures import Figures
 
 __all__ = ["evaluate", "export", "play", "train"]
 
-SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
-
 
 @dataclass(frozen=True)
 class Scene:
     """The environment that a command acts in, as its user described it; the fields are options of the command."""
 
-    motions: Annotated[str, typer.Option("--motions", "-m", help="`embedded`, `paper:DIR`, ...", metavar="SPEC")] = (
-        "embedded"
-    )
-    operator: Annotated[str, typer.Option(help="Who leads.")] = "adult"
-    robot: Annotated[str, typer.Option(help="Who follows.")] = "pepper"
-    route: Annotated[str, typer.Option(help="`auto`, or bodies such as `adult,kid,pepper`.")] = "auto"
-    mapping: Annotated[str, typer.Option(help="Method of the mapping, or a folder of stored ones.")] = "syda"
-    disturbances: Annotated[
-        str, typer.Option(help="`none`, `teleop:CELL:LEVEL` or a single one such as `link:test`.")
-    ] = "none"
-    reference: Annotated[str, typer.Option(help="`paired`: the robot's own motion; `mapped`: the clean mapping.")] = (
-        "paired"
-    )
-    held_out: Annotated[
-        str, typer.Option(help="Actions, comma-separated: left out of fits and training, or played.")
-    ] = ""
+    motions: MotionsOption = "embedded"
+    operator: OperatorOption = None
+    robot: RobotOption = None
+    route: RouteOption = "auto"
+    method: MethodOption = None
+    preset: PresetOption = None
+    mapping: MappingOption = None
+    disturbances: DisturbancesOption = "none"
+    reference: Annotated[
+        str,
+        typer.Option(
+            help="What errors are measured against: `paired`, the robot's own motion, or `mapped`, the clean mapping.",
+            callback=checks.one_of(REFERENCES, "reference"),
+        ),
+    ] = "paired"
+    held_out: HeldOutOption = None
 
     def options(self, *, training: bool = False) -> dict[str, Any]:
         """Environment options; held-out actions are kept out of fits and, if ``training``, out of the motions."""
+        mapping, preset = mapping_of(self.method, self.preset, self.mapping)
+        operator, robot = ends_of(self.operator, self.robot, self.route)
         options: dict[str, Any] = {
             "motions": self.motions,
-            "operator": self.operator,
-            "robot": self.robot,
-            "route": self.route if self.route == "auto" else tuple(self.route.replace(">", ",").split(",")),
-            "mapping": self.mapping,
+            "operator": operator,
+            "robot": robot,
+            "route": route_of(self.route),
+            "mapping": _stored(mapping),
+            "preset": preset,
             "disturbances": None if self.disturbances == "none" else self.disturbances,
             "reference": self.reference,
         }
-        names = tuple(name for name in self.held_out.split(",") if name)
-        if names:
-            options["held_out"] = names
-            options["actions"] = names
-            if training:
-                from syda_gym.motions.loading import load_motions
-
-                known = {take.action for take in load_motions(self.motions).takes}
-                options["actions"] = tuple(sorted(known - set(names)))
+        if self.held_out:
+            known = _actions(self.motions, self.held_out)
+            options["held_out"] = tuple(self.held_out)
+            options["actions"] = tuple(sorted(known - set(self.held_out)) if training else self.held_out)
         return options
+
+
+def _stored(mapping: str) -> Any:
+    """A stored mapping if one file is named; a method or a folder as it is."""
+    if not Path(mapping).is_file():
+        return mapping
+    from syda_gym.mappings.storage import load_mapping
+
+    return load_mapping(mapping)
+
+
+def _actions(motions: str, names: Sequence[str]) -> set[str]:
+    """All actions of the motions, if the named ones are among them."""
+    from syda_gym.errors import nearest_name
+    from syda_gym.motions.loading import load_motions
+
+    known = {take.action for take in load_motions(motions).takes}
+    for name in names:
+        if name not in known:
+            raise typer.BadParameter(
+                f"{motions} has no action {name!r}; {nearest_name(name, known)}", param_hint="'--held-out'"
+            )
+    return known
 
 
 def with_scene(command: Callable[..., None]) -> Callable[..., None]:
@@ -89,14 +127,35 @@ def with_scene(command: Callable[..., None]) -> Callable[..., None]:
 
 @with_scene
 def train(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of bundle, checkpoint and logs.")] = Path("agent"),
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder of bundle, checkpoint and logs.", callback=checks.folder)
+    ] = Path("agent"),
     kind: Annotated[
-        str, typer.Option(help="`residual` (reinforcement learning) or `predictor` (regression).")
+        str,
+        typer.Option(
+            help="`residual` (reinforcement learning) or `predictor` (regression).",
+            callback=checks.one_of(KINDS, "kind"),
+        ),
     ] = "residual",
-    preset: Annotated[str, typer.Option(help="Preset of the residual policy's hyper-parameters.")] = "undisturbed",
-    algorithm: Annotated[str, typer.Option(help="`ppo`, `sac` or `tqc`; the preset's by default.")] = "",
-    steps: Annotated[int, typer.Option(help="Environment steps, or iterations; the preset's by default.", min=0)] = 0,
-    base: Annotated[str, typer.Option(help="What it stands on: a rival's name or a bundle.")] = "base",
+    config: Annotated[
+        str,
+        typer.Option(
+            help=f"Hyper-parameters of the residual policy: {ticked(CONFIGS)}, or a YAML file of your own.",
+            metavar="NAME|FILE",
+            callback=checks.named_or_file(CONFIGS, "training configuration", ".yaml", ".yml"),
+        ),
+    ] = "undisturbed",
+    algorithm: Annotated[
+        str,
+        typer.Option(
+            help=f"{ticked(ALGORITHMS)}; by default the configuration's.",
+            callback=checks.one_of(ALGORITHMS, "algorithm"),
+        ),
+    ] = "",
+    steps: Annotated[int, typer.Option(help="Environment steps, or iterations; 0 for the configuration's.", min=0)] = 0,
+    base: Annotated[
+        str, typer.Option(help=f"What it stands on: {AGENT_HELP}", metavar="AGENT", callback=checks.agents)
+    ] = "base",
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
     seed: SeedOption = 0,
     *,
@@ -106,36 +165,37 @@ def train(
     from syda_gym.agents.predictor.predictor_training import PredictorConfig
     from syda_gym.agents.residual.config import ResidualConfig
     from syda_gym.agents.work import train_agent
-    from syda_gym.errors import OptionError, nearest_name
 
-    if kind not in ("residual", "predictor"):
-        raise OptionError(f"unknown kind {kind!r}; {nearest_name(kind, ('residual', 'predictor'))}")
-    config: Any
+    settings: Any
     if kind == "predictor":
-        config = PredictorConfig(iterations=steps) if steps else PredictorConfig()
+        settings = PredictorConfig(iterations=steps) if steps else PredictorConfig()
     else:
         changes: dict[str, Any] = {"algorithm": algorithm} if algorithm else {}
-        config = ResidualConfig.preset(preset, **changes, **({"steps": steps} if steps else {}))
+        make = ResidualConfig.preset if config in CONFIGS else ResidualConfig.read
+        settings = make(config, **changes, **({"steps": steps} if steps else {}))
     options = scene.options(training=True)
-    with _bar("Training") as tell:
-        report = train_agent(options, out, config=config, base=base, seed=seed, resume=resume, progress=tell)
+    with bar("Training") as tell:
+        report = train_agent(options, out, config=settings, base=base, seed=seed, resume=resume, progress=tell)
     rows = {}
     for place, (step, figures, below) in enumerate(report.history):
         mark = "  (kept)" if place == report.best else ""
         rows[f"after {step}{mark}"] = figures
         last = below
     _print_figures({"what it stands on": last, **rows}, "Validation episodes, servo model")
-    _say(f"stored: [bold]{report.bundle}[/]  (logs and checkpoint beside it; tensorboard --logdir {out})")
+    say_written("stored", report.bundle, f"(logs and checkpoint beside it; tensorboard --logdir {out})")
 
 
 @with_scene
 def evaluate(
-    agents: Annotated[list[str], typer.Argument(help="Bundles, shipped agents or rivals' names.")],
-    physics: Annotated[str, typer.Option(help="`bullet` or `servo`.")] = "bullet",
+    agents: Annotated[list[str], typer.Argument(help=AGENT_HELP, metavar="AGENT...", callback=checks.agents)],
+    physics: Annotated[
+        str, typer.Option(help=f"{ticked(PHYSICS)}.", callback=checks.one_of(PHYSICS, "physics"))
+    ] = "bullet",
     draws: Annotated[int, typer.Option(help="Episodes per clip.", min=1)] = 1,
     clips: Annotated[int, typer.Option(help="Number of clips, spread over all; 0 plays all.", min=0)] = 0,
-    physics_hz: Annotated[float, typer.Option(help="Physics steps per second.")] = 240.0,
+    physics_hz: PhysicsHzOption = 240.0,
     seed: SeedOption = 0,
+    as_json: JsonOption = False,
     *,
     scene: Scene,
 ) -> None:
@@ -151,18 +211,26 @@ def evaluate(
         env = SydaTeleopEnv(**options)
         chosen = list(np.linspace(0, len(env.clip_names) - 1, clips).round().astype(int).tolist())
         env.close()
-    with _bar("Playing") as tell:
+    with bar("Playing") as tell:
         results = compare_agents(options, agents, clips=chosen, draws=draws, seed=seed, progress=tell)
     count = len(next(iter(results.values())))
-    _print_figures(mean_table(results), f"Means over {count} episodes, {physics}, disturbances {scene.disturbances}")
+    means = mean_table(results)
+    if as_json:
+        print_json({"episodes": count, "agents": {name: figures.as_dict() for name, figures in means.items()}})
+        return
+    _print_figures(
+        means, f"Means over {count} episode{'s' * (count > 1)}, {physics}, disturbances {scene.disturbances}"
+    )
 
 
 @with_scene
 def play(
-    agent: Annotated[str, typer.Argument(help="A bundle, a shipped agent or a rival's name.")] = "base",
-    out: Annotated[Path, typer.Option("--out", "-o", help="Video to write.")] = Path("play.mp4"),
+    agent: Annotated[str, typer.Argument(help=AGENT_HELP, callback=checks.agents)] = "base",
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Video to write (.mp4).", callback=checks.ending(".mp4"))
+    ] = Path("play.mp4"),
     clip: Annotated[str, typer.Option(help="Name or number of the clip.")] = "0",
-    physics_hz: Annotated[float, typer.Option(help="Physics steps per second.")] = 240.0,
+    physics_hz: PhysicsHzOption = 240.0,
     seed: SeedOption = 0,
     *,
     scene: Scene,
@@ -171,57 +239,47 @@ def play(
     from syda_gym.agents.work import film
 
     options = scene.options() | {"physics_hz": physics_hz}
-    with _bar("Filming") as tell:
+    with bar("Filming") as tell:
         figures = film(options, agent, out, clip=int(clip) if clip.isdigit() else clip, seed=seed, progress=tell)
     _print_figures({agent: figures}, f"Clip {clip}")
-    _say(f"video: [bold]{out}[/]")
+    say_written("video", out)
 
 
 def export(
-    bundle: Annotated[str, typer.Argument(help="A bundle or a shipped agent.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="ONNX file to write; a card of it as JSON beside.")] = Path(
-        "agent.onnx"
-    ),
+    bundle: Annotated[str, typer.Argument(help="A bundle's path or a shipped agent.", callback=checks.bundle)],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", "-o", help="ONNX file to write; a card of it as JSON beside.", callback=checks.ending(".onnx")
+        ),
+    ] = Path("agent.onnx"),
     mapping: Annotated[
-        str, typer.Option(help="A stored mapping; by default the one beside the bundle, or the shipped one.")
-    ] = "",
+        Path | None,
+        typer.Option(help="A stored mapping; by default the one beside the bundle, or the shipped one."),
+    ] = None,
     agent_only: Annotated[bool, typer.Option("--agent-only", help="Leave the mapping out.")] = False,
 ) -> None:
     """Write mapping and agent as one ONNX graph and check that it commands the same."""
     from syda_gym.agents.work import export_bundle
 
-    difference = export_bundle(bundle, out, mapping=mapping or None, agent_only=agent_only)
-    _say(f"graph: [bold]{out}[/]  largest difference from the original {difference:.1e} rad")
-    _say(f"card of its inputs and outputs: [bold]{out}.json[/]")
+    difference = export_bundle(bundle, out, mapping=mapping, agent_only=agent_only)
+    say_written("graph", out, f"largest difference from the original {difference:.1e} rad")
+    say_written("card of its inputs and outputs", f"{out}.json")
 
 
 def _print_figures(rows: Mapping[str, Figures], title: str) -> None:
-    from rich.table import Table
+    from syda_gym.agents.figures import OBJECTIVE
 
-    table = Table(
-        "agent", "landmark error [mm]", "joint error [mrad]", "jitter [mm/frame³]", "contacts", "J", title=title
-    )
-    for name, figures in rows.items():
-        table.add_row(
+    headings = ("agent", "landmark error [mm]", "joint error [mrad]", "jitter [mm/frame³]", "contacts [%]", "J")
+    cells = (
+        (
             name,
             f"{figures.landmark_mm:.2f}",
             f"{figures.joint_mrad:.2f}",
             f"{figures.jitter:.2f}",
-            f"{100 * figures.contact_steps:.1f} %",
+            f"{100 * figures.contact_steps:.1f}",
             f"{figures.objective:.2f}",
         )
-    console().print(table)
-
-
-def _say(text: str) -> None:
-    console().print(text, soft_wrap=True)
-
-
-@contextmanager
-def _bar(words: str) -> Iterator[Callable[[float], None]]:
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True)) as progress:
-        bar = progress.add_task(words, total=1.0)
-        yield lambda share: progress.update(bar, completed=share)
+        for name, figures in rows.items()
+    )
+    show_table(headings, cells, title=title, note=OBJECTIVE)

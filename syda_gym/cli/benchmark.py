@@ -2,34 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from syda_gym.cli.shared import console, print_table, typed_command
-
-if TYPE_CHECKING:
-    pass
+from syda_gym.cli import checks
+from syda_gym.cli.names import FIGURES, ticked
+from syda_gym.cli.options import (
+    AgentOption,
+    BodiesArgument,
+    CountOption,
+    DisturbancesOption,
+    JsonOption,
+    MethodOption,
+    MotionsOption,
+    OperatorOption,
+    OutFolderOption,
+    PairOption,
+    PresetOption,
+    RobotOption,
+    SeedOption,
+    WorkersOption,
+    ends_of,
+    mapping_of,
+    pairs_of,
+    route_of,
+)
+from syda_gym.cli.shared import console, counted, print_json, print_table, say_written, typed_command
 
 __all__ = ["benchmark", "compare", "export_episodes", "suggest"]
-
-OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder to write to; created if need be.")]
-MotionsOption = Annotated[str, typer.Option("--motions", "-m", help="What to replay.", metavar="SPEC")]
 
 
 def benchmark(
     config: Annotated[Path | None, typer.Argument(help="YAML file; without one a small benchmark is run.")] = None,
-    out: OutOption = Path("benchmark"),
-    workers: Annotated[
-        str, typer.Option("--workers", "-w", help="Processes on this machine, `ray` or `ray:ADDRESS`.", metavar="N")
-    ] = "1",
-    motions: Annotated[
-        str, typer.Option("--motions", "-m", help="What to replay instead of the file's.", metavar="SPEC")
-    ] = "",
+    out: OutFolderOption = Path("benchmark"),
+    workers: WorkersOption = "1",
+    motions: MotionsOption = "",
     parquet: Annotated[bool, typer.Option("--parquet", help="Write Parquet instead of CSV.")] = False,
     show: Annotated[bool, typer.Option("--show", help="Print the configuration with all defaults and stop.")] = False,
 ) -> None:
@@ -47,7 +57,7 @@ def benchmark(
         typer.echo(yaml.safe_dump(settings.as_dict(), sort_keys=False), nl=False)
         return
     data = load_motions(settings.motions, settings.fps)
-    with _cells() as tell:
+    with counted() as tell:
         results = run_benchmark(
             settings, out, workers=workers, motions=data, parquet=parquet, command=typed_command(), progress=tell
         )
@@ -57,7 +67,7 @@ def benchmark(
     for failure in results.about["failures"]:
         last = failure["trace"].strip().splitlines()[-1]
         console(stderr=True).print(f"failed: {failure['cell']}: {last}", style="red", markup=False, soft_wrap=True)
-    console().print(f"\nReport: [bold]{page}[/]", soft_wrap=True)
+    say_written("\nReport", page)
     if results.about["failures"]:
         raise typer.Exit(code=1)
 
@@ -75,10 +85,16 @@ SMALL = {
 def compare(
     first: Annotated[Path, typer.Argument(help="Folder of a benchmark: A.")],
     second: Annotated[Path, typer.Argument(help="Folder of another one: B.")],
-    figure: Annotated[str, typer.Option(help="Which figure to compare.")] = "landmark_error",
+    figure: Annotated[
+        str,
+        typer.Option("--figure", help=f"Which figure: {ticked(FIGURES)}.", callback=checks.one_of(FIGURES, "figure")),
+    ] = "landmark_error",
     any_agent: Annotated[bool, typer.Option("--any-agent", help="Agents of A and B may differ.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Compare two results episode by episode: A minus B, with a verdict only where the interval leaves out zero."""
+    from dataclasses import asdict
+
     from syda_gym.evaluation.benchmark import compare as compare_results
     from syda_gym.evaluation.benchmark import read_results
     from syda_gym.evaluation.benchmark.compare import comparison_table
@@ -90,6 +106,9 @@ def compare(
         labels=(str(first), str(second)),
         ignore=("agent",) if any_agent else (),
     )
+    if as_json:
+        print_json([asdict(one) for one in found])
+        return
     metres = figure in ("landmark_error", "mapping_error", "bound")
     print_table(comparison_table(found, 100.0 if metres else 1.0, "cm" if metres else "", 2 if metres else 4))
 
@@ -97,36 +116,60 @@ def compare(
 def export_episodes(
     name: Annotated[str, typer.Argument(help="Name of the data set, for example `syda/adult-pepper-v0`.")],
     motions: MotionsOption = "embedded",
-    route: Annotated[str, typer.Option(help="Chain, for example `adult>kid>pepper`.")] = "adult>pepper",
-    method: Annotated[str, typer.Option(help="Mapping method, with a preset behind a colon.")] = "syda",
-    agent: Annotated[str, typer.Option(help="`base` or a classical rival.")] = "base",
-    disturbance: Annotated[str, typer.Option(help="`none` or a preset such as `teleop:full:test`.")] = "none",
-    episodes: Annotated[int, typer.Option(help="How many episodes; 0 for one a clip.", min=0)] = 0,
-    seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0)] = 0,
+    operator: OperatorOption = None,
+    robot: RobotOption = None,
+    route: Annotated[
+        str,
+        typer.Option(
+            "--route",
+            help="Bodies such as `adult,kid,pepper`; by default straight from operator to robot.",
+            metavar="A,B,C",
+            callback=checks.route,
+        ),
+    ] = "",
+    method: MethodOption = None,
+    preset: PresetOption = None,
+    agent: AgentOption = "base",
+    disturbances: DisturbancesOption = "none",
+    episodes: Annotated[int, typer.Option("--episodes", help="How many episodes; 0 for one a clip.", min=0)] = 0,
+    seed: SeedOption = 0,
 ) -> None:
-    """Write episodes as a Minari data set, for offline learning (extra `data`)."""
+    """Write episodes as a Minari data set, for offline learning (extra `data`); by default without a chain."""
     from syda_gym.evaluation.minari_export import export_minari
 
+    bodies = route_of(route) or ends_of(operator, robot)
+    first, last = ends_of(operator, robot, route)
+    if bodies == "auto":
+        raise typer.BadParameter("a data set has one chain; name its bodies", param_hint="'--route'")
+    if (first, last) != (bodies[0], bodies[-1]):
+        raise typer.BadParameter(f"{route} does not lead from {first} to {last}", param_hint="'--route'")
+    named, chosen = mapping_of(method, preset, None)
     stored = export_minari(
-        name, motions=motions, route=route, method=method, agent=agent, disturbance=disturbance, episodes=episodes,
-        seed=seed, command=typed_command(),
-    )  # fmt: skip
-    console().print(f"{stored.episodes} episodes, {stored.steps} steps: [bold]{stored.path}[/]", soft_wrap=True)
+        name,
+        motions=motions,
+        route=">".join(bodies),
+        method=f"{named}:{chosen}" if chosen else named,
+        agent=agent,
+        disturbance=disturbances,
+        episodes=episodes,
+        seed=seed,
+        command=typed_command(),
+    )
+    say_written(f"{stored.episodes} episodes, {stored.steps} steps", stored.path)
 
 
 def suggest(
-    bodies: Annotated[
-        list[str] | None, typer.Argument(help="Bodies of your lab; all recorded ones by default.")
-    ] = None,
-    pairs: Annotated[
-        list[str] | None, typer.Option("--pair", help="A pair `A:B` that is fitted; may be repeated.")
-    ] = None,
+    bodies: BodiesArgument = None,
+    pairs: PairOption = None,
     motions: MotionsOption = "embedded",
-    count: Annotated[int, typer.Option(help="How many suggestions.", min=1)] = 5,
+    count: CountOption = 5,
     results: Annotated[
         Path | None, typer.Option("--benchmark", help="A benchmark with a sample-efficiency curve.")
     ] = None,
-    recorded: Annotated[int, typer.Option(help="Paired actions that the new body has so far.", min=0)] = 1,
+    recorded: Annotated[
+        int, typer.Option("--recorded", help="Paired actions that the new body has so far.", min=0)
+    ] = 1,
+    as_json: JsonOption = False,
 ) -> None:
     """Say which pair to record next, and whether a new body should chain or be recorded with the robot."""
     from syda_gym.errors import StorageError
@@ -137,35 +180,22 @@ def suggest(
     from syda_gym.routes.suggestion import spanning_pairs
     from syda_gym.routes.suggestion import suggest as rank
 
-    fitted = [_pair(text) for text in pairs or ()]
+    fitted = pairs_of(pairs)
     known: list[Any] = list(bodies or load_motions(motions).bodies.values())
-    print_table(suggestions_table(rank(known, fitted)[:count], spanning_pairs(known, fitted)))
-    if results is None:
-        return
-    curve = efficiency_curve(read_results(results))
-    if curve is None:
+    curve = None if results is None else efficiency_curve(read_results(results))
+    if results is not None and curve is None:
         raise StorageError(
             f"{results} has no sample-efficiency curve; add `efficiency:` to its configuration and run again"
         )
-    print_table(curve.table())
-    console().print(curve.advice(recorded), style="bold", soft_wrap=True)
-
-
-def _pair(text: str) -> tuple[str, str]:
-    from syda_gym.errors import OptionError
-
-    if text.count(":") != 1:
-        raise OptionError(f"--pair takes two bodies as A:B, for example adult:kid; got {text!r}")
-    first, second = text.split(":")
-    return first, second
-
-
-@contextmanager
-def _cells() -> Iterator[Callable[[int, int, str], None]]:
-    """A progress bar over cells."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=console(stderr=True)) as progress:
-        task = progress.add_task("", total=None)
-        yield lambda done, count, name: progress.update(task, completed=done, total=count, description=name)
+    ranked, spanning = rank(known, fitted)[:count], spanning_pairs(known, fitted)
+    if as_json:
+        print_json({
+            "suggestions": [{"pair": s.pair, "gain": s.gain, "sum": s.total} for s in ranked],
+            "spanning": spanning.pairs,
+            "advice": curve.advice(recorded) if curve else None,
+        })  # fmt: skip
+        return
+    print_table(suggestions_table(ranked, spanning))
+    if curve is not None:
+        print_table(curve.table())
+        console().print(curve.advice(recorded), style="bold", soft_wrap=True, markup=False)

@@ -7,7 +7,30 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from syda_gym.cli.shared import console
+from syda_gym.cli import checks
+from syda_gym.cli.options import (
+    ActionOption,
+    AxesOption,
+    CalibrationOption,
+    MappingOption,
+    MethodOption,
+    MotionsOption,
+    OperatorOption,
+    OutFolderOption,
+    PictureOption,
+    PresetOption,
+    RobotOption,
+    RouteOption,
+    SeedOption,
+    SinkOption,
+    SourceOption,
+    TokenOption,
+    ends_of,
+    mapping_of,
+    route_of,
+)
+from syda_gym.cli.shared import console, say_written, show_table
+from syda_gym.cli.spellings import Program
 
 if TYPE_CHECKING:
     from syda_gym.embodiments.robot import Robot
@@ -15,14 +38,7 @@ if TYPE_CHECKING:
 
 __all__ = ["record", "robot_app", "teleop"]
 
-robot_app = typer.Typer(help="Add your own robot, look at it, list those that are known.", no_args_is_help=True)
-
-OperatorOption = Annotated[str, typer.Option(help="Who leads: a body's name.")]
-TokenOption = Annotated[
-    Path | None, typer.Option("--token-file", help="File with the secret that packets carry beyond this machine.")
-]
-AxesOption = Annotated[str, typer.Option(help="The source's axes: `kinect`, `ros` or `camera`.")]
-NoCalibrationOption = Annotated[float, typer.Option(help="Seconds of standing; 0 trusts the source.", min=0.0)]
+robot_app = Program(help="Add your own robot, look at it, list those that are known.", no_args_is_help=True)
 
 
 @robot_app.command("add")
@@ -33,7 +49,7 @@ def _robot_add(
     right: Annotated[str | None, typer.Option(help="Link at the end of the right arm.")] = None,
     torso: Annotated[str | None, typer.Option(help="Link in whose frame landmarks are expressed.")] = None,
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite a robot that was added before.")] = False,
-    suggest: Annotated[bool, typer.Option(help="Say which pair to record next.")] = True,
+    suggest: Annotated[bool, typer.Option(help="Also say which pair to record next.")] = True,
 ) -> None:
     """Find arms, hands and torso of a URDF, propose landmarks and a rest pose, and make it known by name."""
     import math
@@ -49,10 +65,11 @@ def _robot_add(
     )
     for notice in added.notices:
         say.print(f"- {notice}", markup=False)
-    say.print(f"description: [bold]{added.description}[/] (edit it if something is wrong)", soft_wrap=True)
-    say.print(f"picture: [bold]{added.picture}[/] (the coloured arms must lie on the robot's)", soft_wrap=True)
+    say_written("description", added.description, "(edit it if something is wrong)")
+    say_written("picture", added.picture, "(the coloured arms must lie on the robot's)")
     say.print(
-        f"try it: syda-gym teleop --robot {added.robot.name} --mapping geometric --sink video:{added.robot.name}.mp4"
+        f"try it: syda-gym teleop --robot {added.robot.name} --method geometric --sink video:{added.robot.name}.mp4",
+        soft_wrap=True,
     )
     if suggest:
         from syda_gym.routes.suggestion import suggest as rank
@@ -68,7 +85,7 @@ def _robot_add(
 @robot_app.command("show")
 def _robot_show(
     name: Annotated[str, typer.Argument(help="A robot's name, or the path of its description.")],
-    picture: Annotated[Path | None, typer.Option(help="PNG to draw it into.")] = None,
+    picture: PictureOption = None,
 ) -> None:
     """Show what is known about a robot; draws its picture anew after you have edited its description."""
     from syda_gym.embodiments import catalog
@@ -81,63 +98,81 @@ def _robot_show(
         raise EmbodimentError(f"{name!r} is a {body.kind}; robots can be shown")
     _print_robot(body)
     drawn = draw_robot(body, picture or catalog.user_folder() / f"{body.name}.png")
-    console().print(f"picture: [bold]{drawn}[/]", soft_wrap=True)
+    say_written("picture", drawn)
 
 
 @robot_app.command("list")
 def _robot_list() -> None:
     """List the robots that every command takes by name."""
-    from rich.table import Table
-
     from syda_gym.embodiments import catalog
     from syda_gym.embodiments.robot import Robot
     from syda_gym.errors import SydaError
 
-    table = Table("name", "arms", "joints", "reach \\[m]", "URDF")
+    rows = []
     for name in catalog.names():
         try:
             body = catalog.get(name)
         except SydaError as error:
-            table.add_row(name, "", "", "", f"[red]{error}[/]")
+            rows.append((name, "", "", "", str(error)))
             continue
         if isinstance(body, Robot):
-            table.add_row(name, "+".join(body.sides), str(body.n_features), f"{body.reach:.3f}", str(body.urdf))
-    console().print(table)
+            rows.append((name, "+".join(body.sides), str(body.n_features), f"{body.reach:.3f}", str(body.urdf)))
+    show_table(("name", "arms", "joints", "reach [m]", "URDF"), rows)
 
 
 def teleop(
-    operator: OperatorOption = "adult",
-    robot: Annotated[str, typer.Option(help="Who follows: a robot's name.")] = "pepper",
-    source: Annotated[
-        str, typer.Option(help="`replay:SPEC`, `udp:PORT`, `udp:HOST:PORT` or `ws:PORT`.")
-    ] = "replay:embedded",
-    sink: Annotated[
-        list[str] | None,
-        typer.Option(help="`bullet`, `window`, `video:FILE.mp4`, `udp:HOST:PORT`, `naoqi:URL` or `none`; repeatable."),
-    ] = None,
-    mapping: Annotated[
-        str, typer.Option(help="A method, `geometric` (needs no recordings), a stored mapping, or a folder of them.")
-    ] = "syda",
-    preset: Annotated[str | None, typer.Option(help="Preset of the method.")] = None,
-    route: Annotated[str, typer.Option(help="`auto`, or bodies such as `adult,kid,pepper`.")] = "auto",
-    motions: Annotated[str, typer.Option("--motions", "-m", help="What is fitted on.", metavar="SPEC")] = "embedded",
-    action: Annotated[list[str] | None, typer.Option(help="Action that a replay plays; repeatable.")] = None,
-    speed: Annotated[float, typer.Option(help="Speed of a replay.")] = 1.0,
+    operator: OperatorOption = None,
+    robot: RobotOption = None,
+    source: SourceOption = "replay:embedded",
+    sink: SinkOption = None,
+    method: MethodOption = None,
+    preset: PresetOption = None,
+    mapping: MappingOption = None,
+    route: RouteOption = "auto",
+    motions: MotionsOption = "embedded",
+    action: ActionOption = None,
+    speed: Annotated[
+        float, typer.Option(help="Speed of a replay.", callback=checks.between(0.0, 1000.0, open_low=True))
+    ] = 1.0,
     repeat: Annotated[bool, typer.Option("--repeat", help="A replay begins again at its end.")] = False,
-    calibration: NoCalibrationOption = 2.0,
+    calibration: CalibrationOption = 2.0,
     axes: AxesOption = "kinect",
-    rate: Annotated[float, typer.Option(help="Commands per second while no frame comes.")] = 30.0,
-    limit: Annotated[float, typer.Option(help="Share of the joints' speed limits that may be used.")] = 1.0,
-    bound_slow: Annotated[float | None, typer.Option(help="Error bound [m] from which the robot slows.")] = None,
-    bound_hold: Annotated[float | None, typer.Option(help="Error bound [m] from which it holds.")] = None,
+    rate: Annotated[
+        float,
+        typer.Option(help="Commands per second while no frame comes [Hz].", callback=checks.between(1.0, 1000.0, "Hz")),
+    ] = 30.0,
+    limit: Annotated[
+        float,
+        typer.Option(help="Share of the joints' speed limits that may be used.", callback=checks.between(0.01, 1.0)),
+    ] = 1.0,
+    bound_slow: Annotated[
+        float | None,
+        typer.Option(
+            help="Error bound [m] from which the robot slows.", callback=checks.between(0.0, 10.0, "m", open_low=True)
+        ),
+    ] = None,
+    bound_hold: Annotated[
+        float | None,
+        typer.Option(
+            help="Error bound [m] from which it holds.", callback=checks.between(0.0, 10.0, "m", open_low=True)
+        ),
+    ] = None,
     token_file: TokenOption = None,
     origin: Annotated[list[str] | None, typer.Option(help="Web page that may connect to a WebSocket.")] = None,
-    journal: Annotated[Path | None, typer.Option(help="Write every decision to this `.jsonl` or `.jsonl.gz`.")] = None,
+    journal: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write every decision to this `.jsonl` or `.jsonl.gz`.", callback=checks.ending(".jsonl", ".jsonl.gz")
+        ),
+    ] = None,
     replay_journal: Annotated[
         Path | None, typer.Option("--check-journal", help="Decide a journal anew and compare, instead of a live run.")
     ] = None,
-    seconds: Annotated[float | None, typer.Option(help="End after this time.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of fits.", min=0)] = 0,
+    seconds: Annotated[
+        float | None,
+        typer.Option(help="End after this time [s].", callback=checks.between(0.0, 1e9, "s", open_low=True)),
+    ] = None,
+    seed: SeedOption = 0,
 ) -> None:
     """Drive a robot live: calibrate, map, filter, keep to limits and speeds, avoid self-collision, send."""
     from syda_gym.routes.choice import choose_mapping
@@ -147,13 +182,15 @@ def teleop(
     from syda_gym.teleoperation.tick import LoopSettings
 
     say = console()
+    leader, follower = ends_of(operator, robot, route)
+    stored_or_method, preset = mapping_of(method, preset, mapping)
     with say.status("choosing or fitting the mapping"):
         chosen, notices = choose_mapping(
-            operator,
-            robot,
-            mapping=mapping,
+            leader,
+            follower,
+            mapping=stored_or_method,
             preset=preset,
-            route=route if route == "auto" else tuple(route.split(",")),
+            route=route_of(route),
             motions=motions,
             seed=seed,
         )
@@ -180,7 +217,7 @@ def teleop(
             repeat=repeat,
             origins=tuple(origin or ()),
             journal=journal,
-            note={"mapping": mapping, "motions": motions, "route": route, "source": source},
+            note={"mapping": stored_or_method, "motions": motions, "route": route, "source": source},
             seconds=seconds,
             on_start=screen.start,
             on_decision=screen.update,
@@ -191,34 +228,37 @@ def teleop(
         f"{summary['latency_p50_ms']:.2f} ms, 99 % {summary['latency_p99_ms']:.2f} ms; states {summary['states']}"
     )
     if journal is not None:
-        say.print(f"journal: [bold]{journal}[/]", soft_wrap=True)
+        say_written("journal", journal)
 
 
 def record(
-    out: Annotated[Path, typer.Argument(help="Folder of the new data set.")],
-    operator: OperatorOption = "adult",
-    robot: Annotated[str, typer.Option(help="Who plays the prompts: a robot's name.")] = "pepper",
-    prompts: Annotated[str, typer.Option(help="Motions of the robot to play.", metavar="SPEC")] = "embedded",
-    action: Annotated[
-        list[str] | None, typer.Option(help="Action to play; repeatable. Default: one take of each.")
-    ] = None,
+    out: OutFolderOption,
+    operator: OperatorOption = None,
+    robot: RobotOption = None,
+    motions: MotionsOption = "embedded",
+    action: ActionOption = None,
     takes: Annotated[int, typer.Option(help="Takes per action.", min=1)] = 1,
-    source: Annotated[str, typer.Option(help="Where the person's frames come from; see `teleop`.")] = "udp:9870",
-    sink: Annotated[list[str] | None, typer.Option(help="What shows the robot to the person; see `teleop`.")] = None,
-    calibration: NoCalibrationOption = 2.0,
+    source: SourceOption = "udp:9870",
+    sink: SinkOption = None,
+    calibration: CalibrationOption = 2.0,
     axes: AxesOption = "kinect",
-    countdown: Annotated[float, typer.Option(help="Seconds in the first pose of each prompt.")] = 2.0,
+    countdown: Annotated[
+        float,
+        typer.Option(help="Seconds in the first pose of each prompt.", callback=checks.between(0.0, 600.0, "s")),
+    ] = 2.0,
     token_file: TokenOption = None,
 ) -> None:
-    """Record a pair: the robot plays prompts, a person mimics it, and a data set for `fit` comes out."""
-    from rich.table import Table
+    """Record a pair: the robot plays its motions, a person mimics it, and a data set for `fit` comes out.
 
+    Without `--action` one take of each action is played; without `--sink` a window shows the robot.
+    """
     from syda_gym.motions import write_dataset
     from syda_gym.teleoperation.addresses import make_sink, make_source, read_token
     from syda_gym.teleoperation.setup.record_session import RecordingOptions, choose_prompts, record_session
 
     say = console()
-    clips, leader = choose_prompts(prompts, robot, operator, actions=action or (), takes=takes)
+    performer, player = ends_of(operator, robot)
+    clips, leader = choose_prompts(motions, player, performer, actions=action or (), takes=takes)
     token = read_token(token_file)
     listener = make_source(source, leader, token=token, calibration=calibration)
     options = RecordingOptions(calibration=calibration, axes=axes, countdown=countdown)
@@ -227,16 +267,15 @@ def record(
             listener, shown, clips, leader, options=options, name=out.name, tell=lambda text: say.print(f"> {text}")
         )
     write_dataset(session.motions, out)
-    table = Table("action", "takes", "frames", "lag \\[s]", "correlation", "verdict")
-    for entry in session.quality:
-        table.add_row(
-            entry.action, str(entry.recordings), str(entry.frames), f"{entry.lag:+.2f}", f"{entry.correlation:.2f}",
-            entry.verdict,
-        )  # fmt: skip
-    say.print(table)
+    rows = (
+        (entry.action, str(entry.recordings), str(entry.frames), f"{entry.lag:+.2f}", f"{entry.correlation:.2f}",
+         entry.verdict)
+        for entry in session.quality
+    )  # fmt: skip
+    show_table(("action", "takes", "frames", "lag [s]", "correlation", "verdict"), rows)
     for recording, reason in session.left_out.items():
         say.print(f"- {recording} left out: {reason}", markup=False)
-    say.print(f"written: [bold]{out}[/]; check it: syda-gym motions check {out}", soft_wrap=True)
+    say_written("written", out, f"(check it: syda-gym motions check {out})")
 
 
 class _Screen:
@@ -288,19 +327,15 @@ def _end_gently() -> None:
 
 def _print_robot(robot: Robot) -> None:
     import numpy as np
-    from rich.table import Table
 
-    table = Table(title=robot.name)
-    for heading in ("arm", "joints", "shoulder", "elbow", "wrist", "lengths \\[m]"):
-        table.add_column(heading, overflow="fold")
     arms = {arm.side: arm for arm in robot.description.arms}
-    for side, lengths in zip(robot.sides, robot.arm_lengths, strict=True):
-        arm = arms[side]
-        table.add_row(
-            side, ", ".join(arm.joints), arm.shoulder, arm.elbow, arm.wrist, f"{lengths[0]:.3f} + {lengths[1]:.3f}"
-        )
+    rows = (
+        (side, ", ".join(arms[side].joints), arms[side].shoulder, arms[side].elbow, arms[side].wrist,
+         f"{lengths[0]:.3f} + {lengths[1]:.3f}")
+        for side, lengths in zip(robot.sides, robot.arm_lengths, strict=True)
+    )  # fmt: skip
+    show_table(("arm", "joints", "shoulder", "elbow", "wrist", "lengths [m]"), rows, title=robot.name)
     say = console()
-    say.print(table)
     speed = [f"{value:.1f}" if np.isfinite(value) else "unknown" for value in (robot.speed.min(), robot.speed.max())]
     say.print(
         f"torso {robot.description.torso}; joint speeds {speed[0]} to {speed[1]} rad/s; height {robot.height:.2f} m"

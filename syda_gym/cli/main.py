@@ -9,11 +9,12 @@ import typer
 
 from syda_gym.cli import agents, benchmark, live, motions, routes, studies
 from syda_gym.cli.shared import console
+from syda_gym.cli.spellings import Program
 from syda_gym.errors import SydaError
 
 __all__ = ["app", "main"]
 
-app = typer.Typer(
+app = Program(
     name="syda-gym",
     help="Map a human's motion onto a humanoid, chain such maps, know which chain will work, and prove how good it is.",
     no_args_is_help=True,

@@ -7,26 +7,24 @@ from typing import Annotated
 
 import typer
 
-from syda_gym.cli.shared import (
-    console,
-)
+from syda_gym.cli import checks
+from syda_gym.cli.options import FpsOption, JsonOption, OutFolderOption, PictureOption, SpecArgument
+from syda_gym.cli.shared import console, print_json, say_written, show_table
+from syda_gym.cli.spellings import Program
 
 __all__ = ["motions_app"]
 
-motions_app = typer.Typer(help="Look at recordings, check paired data sets, convert them.", no_args_is_help=True)
+motions_app = Program(help="Look at recordings, check paired data sets, convert them.", no_args_is_help=True)
 
 
 @motions_app.command("info")
 def _motions_info(
-    spec: Annotated[str, typer.Argument(help="`embedded`, `format:PATH`, or a path.", metavar="SPEC")],
-    picture: Annotated[Path | None, typer.Option(help="PNG to draw stick figures into.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    spec: SpecArgument,
+    picture: PictureOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Say what a recording holds: bodies, actions, rate, gaps, and the units and axes that were found."""
-    import json
     import warnings
-
-    from rich.table import Table
 
     from syda_gym.motions import MotionWarning, describe
 
@@ -34,7 +32,7 @@ def _motions_info(
         warnings.simplefilter("ignore", MotionWarning)  # the notes below say the same
         info = describe(spec, picture=picture)
     if as_json:
-        typer.echo(json.dumps(info.to_dict(), indent=1))
+        print_json(info.to_dict())
         return
     rate = f"{info.fps[0]:.4g}" if info.fps[0] == info.fps[1] else f"{info.fps[0]:.4g} to {info.fps[1]:.4g}"
     kind = "synthetic, " if info.synthetic else ""
@@ -43,21 +41,14 @@ def _motions_info(
         f"[bold]{info.name}[/]: {kind}{info.takes} takes of {len(info.actions)} actions, {info.frames} frames, "
         f"{info.seconds:.1f} s at {rate} frames per second{', with timestamps' if info.timestamps else ''}"
     )
-    units = ("stature\n\\[m]", "upper arm\n\\[m]", "forearm\n\\[m]")
-    table = Table("body", "kind", "arms", *units, "frames", "filled", "fastest\n\\[m/s]")
+    units = ("stature\n[m]", "upper arm\n[m]", "forearm\n[m]")
+    rows = []
     for body in info.bodies:
         lengths = (f"{body.height:.2f}", f"{body.upper_arm:.3f}", f"{body.forearm:.3f}")
         share = f"{100 * body.filled:.1f} %"
-        table.add_row(
-            body.name,
-            body.kind,
-            "both" if len(body.sides) > 1 else body.sides[0],
-            *lengths,
-            str(body.frames),
-            share,
-            f"{body.fastest:.1f}",
-        )
-    say.print(table)
+        arms = "both" if len(body.sides) > 1 else body.sides[0]
+        rows.append((body.name, body.kind, arms, *lengths, str(body.frames), share, f"{body.fastest:.1f}"))
+    show_table(("body", "kind", "arms", *units, "frames", "filled", "fastest\n[m/s]"), rows)
     counts = {count for *_, count in info.pairs}
     if len(info.pairs) > 3 and len(counts) == 1:
         say.print(f"paired frames: {counts.pop()} in each of the {len(info.pairs)} pairs of bodies")
@@ -69,7 +60,7 @@ def _motions_info(
     for note in info.notes:
         say.print(f"- {note}", markup=False)
     if picture is not None:
-        say.print(f"picture: [bold]{picture}[/]")
+        say_written("picture", picture)
 
 
 @motions_app.command("check")
@@ -93,11 +84,14 @@ def _motions_check(
 
 @motions_app.command("convert")
 def _motions_convert(
-    spec: Annotated[str, typer.Argument(help="`embedded`, `format:PATH`, or a path.", metavar="SPEC")],
-    out: Annotated[Path, typer.Argument(help="An `.npz` file, or a folder for a data set.")],
-    fps: Annotated[float | None, typer.Option(help="Resample to this rate.")] = None,
+    spec: SpecArgument,
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", help="An `.npz` file, or a folder for a data set.", callback=checks.npz_or_folder),
+    ],
+    fps: FpsOption = None,
     operator: Annotated[
-        str, typer.Option(help="Re-express `operator` as this human of the catalog, say `adult`.")
+        str, typer.Option(help="Re-express the recorded operator as this human of the catalog, say `adult`.")
     ] = "",
 ) -> None:
     """Convert a recording into a motion file or a data set folder."""
@@ -112,51 +106,50 @@ def _motions_convert(
             raise EmbodimentError(f"{operator!r} is a {body.kind}; a recorded operator can only become a human")
         motions = conformed(motions, "operator", body)
     written = save_motions(motions, out) if out.suffix == ".npz" else write_dataset(motions, out)
-    console().print(f"written: [bold]{written}[/]")
+    say_written("written", written)
 
 
 @motions_app.command("pair")
 def _motions_pair(
     operators: Annotated[str, typer.Argument(help="A folder of the operator's recordings, or one file.")],
     prompts: Annotated[str, typer.Argument(help="What the robot played: `embedded`, `format:PATH`, or a path.")],
-    out: Annotated[Path, typer.Argument(help="Folder of the new data set.")],
-    robot: Annotated[str, typer.Option(help="Whose motions the prompts are.")] = "pepper",
-    max_lag: Annotated[float, typer.Option(help="Largest shift in time either way [s].")] = 1.0,
-    fps: Annotated[float | None, typer.Option(help="Frames per second of the pairs.")] = None,
+    out: OutFolderOption,
+    robot: Annotated[str, typer.Option("--robot", help="Who follows: whose motions the prompts are.")] = "pepper",
+    max_lag: Annotated[
+        float,
+        typer.Option(
+            help="Largest shift in time either way [s].", callback=checks.between(0.0, 60.0, "s", open_low=True)
+        ),
+    ] = 1.0,
+    fps: FpsOption = None,
     same_clock: Annotated[bool, typer.Option(help="Both have timestamps of one clock.")] = False,
 ) -> None:
     """Pair an operator's recordings with a robot's prompts by name, align them in time, and judge every action."""
-    from rich.table import Table
-
     from syda_gym.motions import load_motions, operator_clips, pair_session, write_dataset
 
-    played = load_motions(prompts)
+    played = load_motions(prompts).clips(robot)
     session = pair_session(
-        operator_clips(operators), played.clips(robot), fps=fps, max_lag=max_lag, same_clock=same_clock, name=out.name
+        operator_clips(operators), played, fps=fps, max_lag=max_lag, same_clock=same_clock, name=out.name
     )
     write_dataset(session.motions, out)
-    table = Table("action", "takes", "frames", "lag \\[s]", "correlation", "amplitude", "verdict")
+    rows = []
     for entry in session.quality:
         numbers = (f"{entry.lag:+.2f}", f"{entry.correlation:.2f}", f"{entry.amplitude:.2f}")
-        table.add_row(entry.action, str(entry.recordings), str(entry.frames), *numbers, entry.verdict)
+        rows.append((entry.action, str(entry.recordings), str(entry.frames), *numbers, entry.verdict))
+    headings = ("action", "takes", "frames", "lag [s]", "correlation", "amplitude", "verdict")
+    show_table(headings, rows, note="lag, correlation and amplitude are those after alignment")
     say = console()
-    say.print(table)
-    say.print("lag, correlation and amplitude are those after alignment", style="dim")
     for recording, found in session.alignments.items():
         say.print(f"- {recording}: shifted by {found.shift} frames ({found.lag:+.2f} s)", markup=False)
     for recording, reason in session.left_out.items():
         say.print(f"- {recording} left out: {reason}", markup=False)
-    say.print(f"written: [bold]{out}[/]")
+    say_written("written", out)
 
 
 @motions_app.command("formats")
 def _motions_formats() -> None:
     """List the formats that can be read."""
-    from rich.table import Table
-
     from syda_gym.motions import FORMATS
 
-    table = Table("prefix", "what", "usual endings")
-    for entry in FORMATS.values():
-        table.add_row(f"{entry.name}:", entry.description, " ".join(entry.endings))
-    console().print(table)
+    rows = ((f"{entry.name}:", entry.description, " ".join(entry.endings)) for entry in FORMATS.values())
+    show_table(("prefix", "what", "usual endings"), rows)

@@ -2,37 +2,47 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from syda_gym.cli.shared import (
+from syda_gym.cli import checks
+from syda_gym.cli.names import PREDICTORS, ticked
+from syda_gym.cli.options import (
+    BodiesArgument,
+    CountOption,
+    DefinitionOption,
     JsonOption,
+    MaxHopsOption,
     MotionsOption,
+    OperatorOption,
+    PairOption,
+    PictureOption,
+    RobotOption,
     SeedOption,
-    print_json,
-    print_table,
-    stages,
+    ends_of,
+    pairs_of,
 )
+from syda_gym.cli.shared import print_json, print_table, stages
 
 __all__ = ["route", "transferability"]
 
 
 def transferability(
-    bodies: Annotated[list[str] | None, typer.Argument(help="Names, URDFs or robot descriptions; all pairs.")] = None,
-    definition: Annotated[str, typer.Option(help="`general` or `paper`.")] = "general",
+    bodies: BodiesArgument = None,
+    definition: DefinitionOption = "general",
     validate: Annotated[bool, typer.Option("--validate", help="Measure whether it predicts held-out errors.")] = False,
     motions: MotionsOption = "embedded",
-    folds: Annotated[int, typer.Option(help="Groups of actions to hold out (`--validate`).", min=2)] = 4,
-    max_hops: Annotated[int, typer.Option(help="Longest chain (`--validate`).", min=1)] = 3,
-    picture: Annotated[
-        Path | None, typer.Option(help="Write clouds and regions of the first pair (or the validation) as PNG.")
-    ] = None,
+    folds: Annotated[int, typer.Option("--folds", help="Groups of actions to hold out (`--validate`).", min=2)] = 4,
+    max_hops: MaxHopsOption = None,
+    picture: PictureOption = None,
     seed: SeedOption = 0,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure how well each body can stand in for each other one, term by term."""
+    """Measure how well each body can stand in for each other one, term by term.
+
+    The picture shows clouds and regions of the first pair; with `--validate` predictions beside measured errors.
+    """
     from itertools import permutations
 
     from syda_gym.embodiments import catalog
@@ -45,7 +55,7 @@ def transferability(
 
         with stages({"fit": "Fitting every pair and fold", "chains": "Scoring every chain"}) as tell:
             study = measure_prediction(
-                motions, bodies=bodies or None, folds=folds, max_hops=max_hops, seed=seed, progress=tell
+                motions, bodies=bodies or None, folds=folds, max_hops=max_hops or 3, seed=seed, progress=tell
             )
         tables = [prediction_table(study), *([prediction_table(study, full=True)] if study.full_scores else [])]
         if picture:
@@ -75,30 +85,36 @@ def transferability(
 
 
 def route(
-    source: Annotated[str, typer.Option("--from", help="Who leads.")],
-    target: Annotated[str, typer.Option("--to", help="Who follows.")],
-    pairs: Annotated[
-        list[str] | None, typer.Option("--pair", help="A fitted pair `A:B`; may be repeated. Default: all recorded.")
-    ] = None,
+    operator: OperatorOption = None,
+    robot: RobotOption = None,
+    pairs: PairOption = None,
     motions: MotionsOption = "embedded",
-    definition: Annotated[str, typer.Option(help="`general` or `paper`.")] = "general",
-    max_hops: Annotated[int | None, typer.Option(help="Longest chain.", min=1)] = None,
+    definition: DefinitionOption = "general",
+    max_hops: MaxHopsOption = None,
     predictor: Annotated[
-        str, typer.Option(help="What decides: `T`, `C`, `L`, `coverage`, `hops`, or `measured`.")
+        str,
+        typer.Option(
+            "--predictor", help=f"What decides: {ticked(PREDICTORS)}.", callback=checks.one_of(PREDICTORS, "predictor")
+        ),
     ] = "T",
-    count: Annotated[int, typer.Option(help="How many routes to list.", min=1)] = 5,
+    count: CountOption = 5,
     noise: Annotated[bool, typer.Option("--noise", help="Take alpha from the noise of the recordings.")] = False,
     suggest: Annotated[bool, typer.Option("--suggest", help="Also say which pair to record next.")] = False,
-    picture: Annotated[Path | None, typer.Option(help="Write the graph with the chosen route as PNG.")] = None,
+    picture: PictureOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Choose the chain of bodies from one to another that transferability ranks best."""
+    """Choose the chain of bodies from operator to robot that transferability ranks best.
+
+    Fitted pairs are those of `--pair`, by default all that were recorded together in the motions.
+    """
+    from syda_gym.embodiments import catalog
     from syda_gym.evaluation.prediction.tables import routes_table, suggestions_table
     from syda_gym.files import write_bytes
     from syda_gym.routes import routing, suggestion
 
     kind: Any = definition  # checked, with the nearest name, where it is used
-    fitted, bodies = _fitted_pairs(pairs, motions)
+    source, target = ends_of(operator, robot)
+    fitted, bodies = _fitted_pairs(pairs_of(pairs), motions)
     options: dict[str, Any] = {"max_hops": max_hops, "predictor": predictor}
     if predictor == "measured":
         from syda_gym.evaluation.prediction.study import measure_bodies
@@ -112,6 +128,10 @@ def route(
         from syda_gym.routes.noise import alpha_from_noise
 
         options["alpha"] = alpha_from_noise(motion_noise(load_motions(motions)))
+    known = {getattr(body, "name", body) for pair in fitted for body in pair}
+    for name in (source, target):
+        if name not in known:
+            catalog.resolve(name)  # a body that nobody knows is told as such, not as one without a fitted pair
     best = routing.best_route(source, target, fitted, kind, **options)
     ranked = routing.ranked_routes(source, target, fitted, kind, count=count, **options)
     routes = [best, *(other for other in ranked if other.bodies != best.bodies)][:count]
@@ -138,17 +158,12 @@ def route(
         print_table(suggestions_table(further, spanning))
 
 
-def _fitted_pairs(pairs: list[str] | None, motions: str) -> tuple[list[tuple[Any, Any]], list[Any]]:
+def _fitted_pairs(pairs: list[tuple[str, str]], motions: str) -> tuple[list[tuple[Any, Any]], list[Any]]:
     """Pairs as the user named them, or all that were recorded together; and everybody who can be paired."""
-    from syda_gym.errors import OptionError
     from syda_gym.motions.loading import load_motions
 
-    if not pairs:
-        recorded = load_motions(motions)
-        fitted = [(recorded.bodies[a], recorded.bodies[b]) for a, b in recorded.pairs]
-        return fitted, list(recorded.bodies.values())
-    for pair in pairs:
-        if pair.count(":") != 1:
-            raise OptionError(f"--pair takes two bodies as A:B, for example adult:kid; got {pair!r}")
-    named = [(pair.split(":")[0], pair.split(":")[1]) for pair in pairs]
-    return named, list(dict.fromkeys(name for pair in named for name in pair))
+    if pairs:
+        return list(pairs), list(dict.fromkeys(name for pair in pairs for name in pair))
+    recorded = load_motions(motions)
+    fitted = [(recorded.bodies[a], recorded.bodies[b]) for a, b in recorded.pairs]
+    return fitted, list(recorded.bodies.values())

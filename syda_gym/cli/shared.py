@@ -1,12 +1,12 @@
-"""What all commands share: options, the console, tables, progress; knows no command."""
+"""How all commands speak: the console, tables, progress, JSON; knows no command."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -14,24 +14,16 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 __all__ = [
-    "JsonOption",
-    "MotionsOption",
-    "OutOption",
-    "SeedOption",
+    "bar",
     "console",
+    "counted",
     "print_json",
     "print_table",
+    "say_written",
+    "show_table",
     "stages",
     "typed_command",
 ]
-
-MotionsOption = Annotated[
-    str,
-    typer.Option("--motions", "-m", help="`embedded`, `paper:DIR`, `npz:FILE` or another recording.", metavar="SPEC"),
-]
-OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder to write to; created if need be.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
 
 
 def console(*, stderr: bool = False) -> Console:
@@ -53,6 +45,58 @@ def print_table(table: Any) -> None:
     from syda_gym.evaluation import terminal
 
     terminal.print_table(table, console())
+
+
+def show_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, title: str = "", note: str = "") -> None:
+    """Prints a small table, every character as it is: ``[mm]`` is a unit and no markup.
+
+    Args:
+        headings: of the columns, with units.
+        rows: cells, as many as headings.
+        title: above it.
+        note: below it, what a reader needs to understand a column.
+    """
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=Text(title) if title else None)
+    for heading in headings:
+        table.add_column(Text(heading), overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    say = console()
+    say.print(table)
+    if note:
+        say.print(Text(note, style="dim"), soft_wrap=True)
+
+
+def say_written(what: str, path: str | Path, remark: str = "") -> None:
+    """Says what was written where, as one line that can be copied."""
+    from rich.text import Text
+
+    line = Text.assemble(f"{what}: ", (str(path), "bold"), f" {remark}" if remark else "")
+    console().print(line, soft_wrap=True)
+
+
+@contextmanager
+def bar(words: str) -> Iterator[Callable[[float], None]]:
+    """One progress bar; yields a function that is told the finished fraction."""
+    from rich.progress import Progress
+
+    with Progress(console=console(stderr=True)) as progress:
+        task = progress.add_task(words, total=1.0)
+        yield lambda share: progress.update(task, completed=share)
+
+
+@contextmanager
+def counted() -> Iterator[Callable[[int, int, str], None]]:
+    """A progress bar over cells; yields a function that is told how many of how many, and the last one's name."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=console(stderr=True)) as progress:
+        task = progress.add_task("", total=None)
+        yield lambda done, count, name: progress.update(task, completed=done, total=count, description=name)
 
 
 @contextmanager

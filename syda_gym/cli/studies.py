@@ -7,23 +7,20 @@ from typing import Annotated
 
 import typer
 
-from syda_gym.cli.shared import (
-    MotionsOption,
-    OutOption,
-    SeedOption,
-    console,
-    print_table,
-    stages,
-    typed_command,
-)
+from syda_gym.cli import checks
+from syda_gym.cli.names import METHODS, PROTOCOLS, ticked
+from syda_gym.cli.options import MethodsOption, MotionsOption, OutFolderOption, SeedOption
+from syda_gym.cli.shared import console, print_table, say_written, stages, typed_command
 
 __all__ = ["demo", "reproduce_paper"]
 
 
 def demo(
     motions: MotionsOption = "embedded",
-    out: OutOption = Path("demo"),
-    robot: Annotated[str, typer.Option(help="Who is driven; by default Pepper or the first robot.")] = "",
+    out: OutFolderOption = Path("demo"),
+    robot: Annotated[
+        str | None, typer.Option("--robot", help="Who follows: a robot of the motions; by default Pepper or the first.")
+    ] = None,
     seed: SeedOption = 0,
     residual: Annotated[bool, typer.Option(help="Train the short residual policy.")] = True,
 ) -> None:
@@ -41,7 +38,7 @@ def demo(
     }
     with stages(words) as tell:
         result = run_demo(
-            motions, out, robot=robot or None, seed=seed, residual=residual, command=typed_command(), progress=tell
+            motions, out, robot=robot, seed=seed, residual=residual, command=typed_command(), progress=tell
         )
     print_table(transferability_table(result))
     for operator, route in result.chosen.items():
@@ -50,18 +47,22 @@ def demo(
     print_table(chain_table(result))
     if result.residual:
         print_table(result.residual.table())
-    console().print(f"\nReport: [bold]{result.report}[/]  (open it in a browser)")
+    say_written("\nReport", result.report or out, "(open it in a browser)")
 
 
 def reproduce_paper(
-    motions: Annotated[
-        str, typer.Option("--motions", "-m", help="`paper:DIR`: the paper's recordings.", metavar="SPEC")
-    ],
-    out: OutOption = Path("reproduce-paper"),
-    seeds: Annotated[int, typer.Option(help="Seeds of splits and networks.", min=1)] = 10,
-    protocol: Annotated[list[str] | None, typer.Option(help="Only `rand3`, `twin3` or `loao`; repeatable.")] = None,
-    method: Annotated[list[str] | None, typer.Option(help="Only this `method/preset`; repeatable.")] = None,
-    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 2,
+    motions: MotionsOption,
+    out: OutFolderOption = Path("reproduce-paper"),
+    seeds: Annotated[int, typer.Option("--seeds", help="How many seeds of splits and networks.", min=1)] = 10,
+    protocol: Annotated[
+        list[str] | None,
+        typer.Option(
+            help=f"Only {ticked(PROTOCOLS)}; repeatable or comma-separated.",
+            callback=checks.several(PROTOCOLS, "protocol"),
+        ),
+    ] = None,
+    method: MethodsOption = None,
+    workers: Annotated[int, typer.Option("--workers", "-w", help="Processes on this machine.", min=1)] = 2,
 ) -> None:
     """Print the paper's Tables 2 to 5 beside ours: every method, three labelled protocols, many seeds."""
     from syda_gym.evaluation.paper.report import tables
@@ -74,7 +75,7 @@ def reproduce_paper(
             out,
             seeds=seeds,
             protocols=tuple(protocol) if protocol else PROTOCOLS,
-            contenders=method,
+            contenders=[_contender(text) for text in method] if method else None,
             workers=workers,
             progress=lambda fraction, _: tell("study", fraction),
         )
@@ -82,4 +83,10 @@ def reproduce_paper(
         print_table(table)
     for name, reason in study.skipped.items():
         console(stderr=True).print(f"left out {name}: {reason}", markup=False)
-    console(stderr=True).print(f"tables, plots and study.json are in {out}", markup=False)
+    say_written("tables, plots and study.json", out)
+
+
+def _contender(text: str) -> str:
+    """``NAME[:PRESET]`` as the study calls it: ``NAME/PRESET``, with the default preset where none is named."""
+    name, _, preset = text.partition(":")
+    return f"{name}/{preset or METHODS[name][0]}"

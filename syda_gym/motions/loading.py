@@ -6,7 +6,9 @@ import os
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -89,7 +91,7 @@ def _format_and_path(text: str) -> tuple[Format, Path]:
         return FORMATS[prefix], Path(rest).expanduser()
     path = Path(text).expanduser()
     if not path.exists():
-        hint = "" if not colon else f"; {prefix!r} is no format, {nearest_name(prefix, FORMATS)}"
+        hint = f"; {prefix!r} is no format, {nearest_name(prefix, FORMATS)}" if colon else _meant(text)
         raise MotionError(f"no motions {text!r}: expected 'embedded', 'format:PATH' or the path of a recording{hint}")
     for chosen in FORMATS.values():
         if chosen.matches(path):
@@ -98,6 +100,19 @@ def _format_and_path(text: str) -> tuple[Format, Path]:
         if path.suffix.lower() in chosen.endings:  # not what its ending says: its reader knows what is wrong with it
             return chosen, path
     raise MotionError(f"{path} is of no known format ({', '.join(FORMATS)}); name it as format:PATH")
+
+
+def _meant(text: str) -> str:
+    """Says "did you mean" where ``embedded`` or a file beside the missing one has nearly that name."""
+    path = Path(text).expanduser()
+    try:
+        names = [other.name for other in islice(path.parent.iterdir(), 1000)]
+    except OSError:  # no such folder, or one that may not be read
+        names = []
+    if path.name == text:
+        names.append("embedded")
+    close = get_close_matches(path.name, names, n=1)
+    return f"; did you mean {str(path.with_name(close[0]))!r}?" if close else ""
 
 
 def _is_paper(path: Path) -> bool:

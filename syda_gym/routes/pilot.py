@@ -164,6 +164,11 @@ class Pilot:
         if len(set(bodies)) != len(bodies):
             raise RouteError(f"route {bodies} passes a body twice")
         known = list(self._stored) or [pair for a, b in self.motions.pairs for pair in ((a, b), (b, a))]
+        named = {name for pair in known for name in pair}
+        for name in bodies:
+            if name not in named:
+                words = ">".join(bodies)
+                raise RouteError(f"route {words}: no mapping leads from or to {name!r}; {nearest_name(name, named)}")
         for link in zip(bodies[:-1], bodies[1:], strict=True):
             if link not in known:
                 pairs = ", ".join(f"{a}>{b}" for a, b in known)

@@ -47,13 +47,14 @@ def test_info_as_json(kinect: Path) -> None:
 
 def test_convert_to_file_and_folder_and_check(kinect: Path, tmp_path: Path) -> None:
     result = run(
-        app, ["motions", "convert", f"kinect:{kinect}", str(tmp_path / "a.npz"), "--fps", "10", "--operator", "adult"]
+        app,
+        ["motions", "convert", f"kinect:{kinect}", "-o", str(tmp_path / "a.npz"), "--fps", "10", "--operator", "adult"],
     )
     assert result.exit_code == 0, result.output
     converted = load_motions(tmp_path / "a.npz")
     assert list(converted.bodies) == ["adult"]
     assert converted.takes[0].fps == 10.0
-    assert run(app, ["motions", "convert", str(tmp_path / "a.npz"), str(tmp_path / "set")]).exit_code == 0
+    assert run(app, ["motions", "convert", str(tmp_path / "a.npz"), "--out", str(tmp_path / "set")]).exit_code == 0
     result = run(app, ["motions", "check", str(tmp_path / "set")])
     assert result.exit_code == 0
     assert "no take has two bodies" in result.output

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from syda_gym.cli.main import app
-from syda_gym.errors import OptionError, RouteError
+from syda_gym.errors import RouteError
 
 runner = CliRunner()
 
@@ -34,7 +34,7 @@ def test_transferability_prints_a_table() -> None:
 def test_route_prints_the_best_one_first_and_draws_it(tmp_path: Path) -> None:
     picture = tmp_path / "graph.png"
     pairs = ("--pair", "adult:kid", "--pair", "kid:pepper", "--pair", "adult:pepper")
-    text = run("route", "--from", "adult", "--to", "pepper", *pairs, "--definition", "paper", "--json",
+    text = run("route", "--operator", "adult", "--robot", "pepper", *pairs, "--definition", "paper", "--json",
                "--suggest", "--picture", str(picture))  # fmt: skip
     found = json.loads(text)
     assert [route["bodies"] for route in found["routes"]] == [["adult", "pepper"], ["adult", "kid", "pepper"]]
@@ -44,7 +44,8 @@ def test_route_prints_the_best_one_first_and_draws_it(tmp_path: Path) -> None:
 
 
 def test_bad_pairs_are_told() -> None:
-    with pytest.raises(OptionError, match="adult:kid"):
-        run("route", "--from", "adult", "--to", "pepper", "--pair", "adult-kid")
+    wrong = runner.invoke(app, ["route", "--operator", "adult", "--robot", "pepper", "--pair", "adult-kid"])
+    assert wrong.exit_code == 2
+    assert "adult:kid" in wrong.output
     with pytest.raises(RouteError, match="pepper"):
-        run("route", "--from", "adult", "--to", "pepper", "--pair", "adult:kid")
+        run("route", "--operator", "adult", "--robot", "pepper", "--pair", "adult:kid")

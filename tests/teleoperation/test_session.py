@@ -191,7 +191,7 @@ def test_the_command_line_runs_journals_and_checks(tmp_path: Path) -> None:
     from syda_gym.cli.main import app
 
     journal = tmp_path / "run.jsonl"
-    common = ["teleop", "--mapping", "geometric"]
+    common = ["teleop", "--method", "geometric"]
     live = ["--sink", "none", "--action", "wave_high", "--calibration", "0.5", "--speed", "3"]
     result = CliRunner().invoke(app, [*common, *live, "--journal", str(journal)])
     assert result.exit_code == 0, result.output
@@ -231,7 +231,7 @@ def test_the_command_line_records_a_pair(tmp_path: Path) -> None:
 
     out = tmp_path / "pairs"
     options = ["--sink", "none", "--action", "wave_high", "--countdown", "0.1", "--calibration", "0.5"]
-    result = CliRunner().invoke(app, ["record", str(out), "--source", "replay:embedded", *options])
+    result = CliRunner().invoke(app, ["record", "--out", str(out), "--source", "replay:embedded", *options])
     assert result.exit_code == 0, result.output
     assert "mimic the robot now" in result.output
     assert "wave_high" in result.output

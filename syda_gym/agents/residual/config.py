@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from syda_gym.agents.residual.costs import CostWeights
-from syda_gym.errors import OptionError, nearest_name
+from syda_gym.errors import OptionError, StorageError, nearest_name
 from syda_gym.files import asset
 
 __all__ = ["ALGORITHMS", "ResidualConfig", "preset_names"]
 
 ALGORITHMS = ("ppo", "sac", "tqc")
 """PPO and SAC of Stable-Baselines3, TQC of sb3-contrib (extra ``train``)."""
+
+_MAX_BYTES = 2**16  # of a configuration file
 
 
 @dataclass(frozen=True)
@@ -132,6 +136,30 @@ class ResidualConfig:
             raise OptionError(f"unknown preset {name!r}; {nearest_name(name, preset_names())}")
         values = yaml.safe_load(asset("agents", "presets", f"{name}.yaml").read_text(encoding="utf-8"))
         return cls.of({**values, **changes})
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], **changes: Any) -> ResidualConfig:
+        """A YAML file of hyper-parameters, with some values changed.
+
+        Raises:
+            StorageError: no such file, too large, or not YAML.
+            OptionError: unknown hyper-parameter or bad value.
+        """
+        import yaml
+
+        file = Path(path)
+        if not file.is_file() or file.stat().st_size > _MAX_BYTES:
+            raise StorageError(f"no training configuration {file}: expected a short YAML file of hyper-parameters")
+        try:
+            values = yaml.safe_load(file.read_text(encoding="utf-8"))
+        except (yaml.YAMLError, ValueError, RecursionError) as error:
+            raise StorageError(f"{file} is not valid YAML: {' '.join(str(error).split())}") from error
+        if not isinstance(values, dict):
+            raise OptionError(f"{file}: expected names and values, got {type(values).__name__}")
+        try:
+            return cls.of({**values, **changes})
+        except (TypeError, ValueError) as error:
+            raise OptionError(f"{file}: {error}") from error
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data from which ``of`` makes an equal configuration."""

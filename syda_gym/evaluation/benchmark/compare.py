@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from syda_gym.errors import OptionError
+from syda_gym.errors import OptionError, nearest_name
 from syda_gym.evaluation.benchmark.results import Results
 from syda_gym.evaluation.report.model import Cell, Column, Table
 from syda_gym.evaluation.statistics import Estimate, clustered_estimate, probability_of_improvement
@@ -107,7 +107,7 @@ def comparison_table(comparisons: Sequence[Comparison], scale: float = 1.0, unit
 def _by_episode(results: Results, names: Sequence[str], figure: str) -> dict[tuple[Any, ...], tuple[float, str]]:
     """Mean over seeds of a figure for each episode, with its action."""
     if results.rows and figure not in results.rows[0]:
-        raise OptionError(f"no figure {figure!r}; the columns are {', '.join(results.rows[0])}")
+        raise OptionError(f"no figure {figure!r}; {nearest_name(figure, results.rows[0])}")
     found: dict[tuple[Any, ...], list[float]] = {}
     actions: dict[tuple[Any, ...], str] = {}
     for row in results.rows:

@@ -57,14 +57,15 @@ def run_benchmark(
     cells = cells_of(config, data)
     if not cells:
         raise OptionError("the configuration asks for no cell; name at least one route, method, agent and seed")
-    folder = _prepare(Path(out))
+    folder = Path(out) / "cells"
     tell = progress or (lambda done, count, name: None)
     left = [cell for cell in cells if not _stored(folder, cell)]
     done = len(cells) - len(left)
     tell(done, len(cells), "")
     if left:
-        pool = make_pool(workers, data)
+        pool = make_pool(workers, data)  # before the folder is made: a pool that is refused leaves nothing
         try:
+            _prepare(folder)
             for outcome in _computed(pool, left):
                 cell = Cell.from_dict(outcome["cell"])
                 _store(folder, cell, outcome)
@@ -95,8 +96,7 @@ def _computed(pool: Pool, cells: Sequence[Cell]) -> Any:
         yield outcome
 
 
-def _prepare(out: Path) -> Path:
-    folder = out / "cells"
+def _prepare(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".writable"
@@ -105,8 +105,9 @@ def _prepare(out: Path) -> Path:
         for leftover in folder.glob(".*-*.json"):  # a killed process could not tidy up
             leftover.unlink()
     except OSError as error:
-        raise StorageError(f"cannot write into {out}: {error.strerror}; choose another folder with --out") from error
-    return folder
+        raise StorageError(
+            f"cannot write into {folder.parent}: {error.strerror}; choose another folder with --out"
+        ) from error
 
 
 def _stored(folder: Path, cell: Cell) -> bool:

@@ -64,7 +64,6 @@ def run_demo(
 
     tell = progress or (lambda stage, done: None)
     clock = _Clock(tell)
-    folder = _folder(out)
     with clock("load"):
         data = load_motions(motions)
         driven = _robot(data, robot)
@@ -73,6 +72,7 @@ def run_demo(
         routes = all_routes(data, operators, [driven.name], 2, via=bodies)
         operators = list(dict.fromkeys(route[0] for route in routes))
         groups = _groups(data, operators[0], driven.name, seed)
+        folder = _folder(out)  # after whatever can be refused, so that a refusal leaves nothing
     with clock("transferability"):
         links, paper_links = _measure(data, routes, tell)
         products = {route: float(np.prod([links[edge].T for edge in _edges(route)])) for route in routes}

@@ -14,7 +14,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from syda_gym.errors import MotionError, OptionError, StorageError
+from syda_gym.errors import MotionError, OptionError, StorageError, nearest_name
 from syda_gym.evaluation.paper.cells import CONTENDERS, HUMANS, ROBOT, Cell, CellTask, Contender
 from syda_gym.evaluation.paper.extras import FewShotTask, WindowTask
 from syda_gym.evaluation.paper.results import Study, Task
@@ -66,7 +66,7 @@ def reproduce(
         raise OptionError(f"seeds and workers must be at least 1, got {seeds} and {workers}")
     for protocol in protocols:
         if protocol not in PROTOCOLS:
-            raise OptionError(f"unknown protocol {protocol!r}; known: {', '.join(PROTOCOLS)}")
+            raise OptionError(f"unknown protocol {protocol!r}; {nearest_name(protocol, PROTOCOLS)}")
     spec = os.fspath(motions)
     loaded = load_motions(spec)
     mark = _check(loaded)
@@ -135,7 +135,7 @@ def _chosen(names: Sequence[str] | None) -> tuple[Contender, ...]:
     known = {contender.name: contender for contender in CONTENDERS}
     for name in names:
         if name not in known:
-            raise OptionError(f"unknown contender {name!r}; known: {', '.join(known)}")
+            raise OptionError(f"unknown contender {name!r}; {nearest_name(name, known)}")
     return tuple(known[name] for name in names)
 
 

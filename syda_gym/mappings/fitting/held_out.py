@@ -11,7 +11,7 @@ import numpy as np
 from syda_gym.embodiments import landmark_error
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
-from syda_gym.errors import MappingError, OptionError
+from syda_gym.errors import MappingError, OptionError, nearest_name
 from syda_gym.mappings.coded_mapping import CodedMapping
 from syda_gym.mappings.fitting.fit import METHODS, fit_many
 from syda_gym.mappings.fitting.windows import WindowRow, window_study
@@ -109,7 +109,7 @@ def fit_folds(
         The folds, seed by seed.
     """
     if method not in METHODS:
-        raise OptionError(f"unknown method {method!r}; known: {', '.join(METHODS)}")
+        raise OptionError(f"unknown method {method!r}; {nearest_name(method, METHODS)}")
     splits = [(int(seed), mask) for seed in seeds for mask in pair.fold_masks(protocol, seed=int(seed))]
     training: dict[bytes, PairedMotions] = {}
     pairs = [training.setdefault(mask.tobytes(), pair.rows(~mask)) for _, mask in splits]

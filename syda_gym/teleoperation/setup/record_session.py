@@ -277,7 +277,7 @@ def _robot_clips(data: Motions, robot: str) -> list[MotionClip]:
         return [clip for clip in data.clips(robot) if not clip.mirrored]
     others = [name for name, body in data.bodies.items() if isinstance(body, Robot)]
     if not others:
-        raise MotionError(f"{data.name} holds no robot's motions to take prompts from; name others with --prompts")
+        raise MotionError(f"{data.name} holds no robot's motions to take prompts from; name others with --motions")
     carry = geometric_mapping(data.bodies[others[0]], follower)
     return [
         MotionClip(follower, carry.sequence(clip.frames, clip.fps), clip.fps, clip.action, clip.recording)

@@ -86,9 +86,9 @@ def add_robot(
         )
     description, notices = describe_robot(urdf, chosen, left=left, right=right, torso=torso)
     robot = Robot(description)
+    picture = draw_robot(robot, path.with_suffix(".png"))  # first: a robot that cannot be drawn is not added
     write_text(path, _yaml(robot))
     catalog.register(chosen, Robot.read(path), replace=True)
-    picture = draw_robot(robot, path.with_suffix(".png"))
     return AddedRobot(robot, path, picture, _pointing_error(robot), tuple(notices))
 
 

@@ -117,7 +117,7 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     save_motions(prompts, tmp_path / "prompts.npz")
     (tmp_path / "me").mkdir()
     rec.write_rows(tmp_path / "me" / "wave_high.csv", rec.kinect_rows(count=100))
-    words = ["motions", "pair", str(tmp_path / "me"), str(tmp_path / "prompts.npz"), str(tmp_path / "set")]
+    words = ["motions", "pair", str(tmp_path / "me"), str(tmp_path / "prompts.npz"), "--out", str(tmp_path / "set")]
     result = CliRunner(env={"COLUMNS": "160"}).invoke(app, words)
     assert result.exit_code == 0, (result.output, result.exception)
     assert "good" in result.output
