@@ -28,6 +28,7 @@ from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.envs.teleop import SydaTeleopEnv
 from syda_gym.errors import AgentError, nearest_name
 from syda_gym.files import asset
+from syda_gym.locks import locked_folder
 from syda_gym.mappings.mapping import Mapping as MotionMapping
 from syda_gym.mappings.storage import save_mapping
 
@@ -87,11 +88,22 @@ def train_agent(
         progress: called with the share that is done.
 
     Raises:
-        SydaError: bad options, nothing to resume, a bundle that does not fit.
+        SydaError: bad options, nothing to resume, a bundle that does not fit, a folder that another process writes.
     """
+    with locked_folder(out, "agent") as folder:
+        return _train(options, folder, config or ResidualConfig(), base, seed, resume, progress)
+
+
+def _train(
+    options: TeleopOptions | Mapping[str, Any],
+    folder: Path,
+    settings: ResidualConfig | PredictorConfig,
+    base: str | os.PathLike[str],
+    seed: int,
+    resume: bool,
+    progress: Progress | None,
+) -> TrainingReport:
     ground = Ground(options)
-    settings = config or ResidualConfig()
-    folder = Path(out)
     if isinstance(settings, PredictorConfig):
         below = find_agent(base, ground.interface)
         filters = below.base if isinstance(below, Lead) and below.base is not None else below

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from syda_gym.cli.shared import console
+from syda_gym.cli.shared import console, interruptible
 
 if TYPE_CHECKING:
     from syda_gym.agents.figures import Figures
@@ -117,7 +117,7 @@ def train(
         changes: dict[str, Any] = {"algorithm": algorithm} if algorithm else {}
         config = ResidualConfig.preset(preset, **changes, **({"steps": steps} if steps else {}))
     options = scene.options(training=True)
-    with _bar("Training") as tell:
+    with interruptible(lambda: _where_to_go_on(out, kind)), _bar("Training") as tell:
         report = train_agent(options, out, config=config, base=base, seed=seed, resume=resume, progress=tell)
     rows = {}
     for place, (step, figures, below) in enumerate(report.history):
@@ -151,7 +151,7 @@ def evaluate(
         env = SydaTeleopEnv(**options)
         chosen = list(np.linspace(0, len(env.clip_names) - 1, clips).round().astype(int).tolist())
         env.close()
-    with _bar("Playing") as tell:
+    with interruptible("nothing was kept; run the command again"), _bar("Playing") as tell:
         results = compare_agents(options, agents, clips=chosen, draws=draws, seed=seed, progress=tell)
     count = len(next(iter(results.values())))
     _print_figures(mean_table(results), f"Means over {count} episodes, {physics}, disturbances {scene.disturbances}")
@@ -171,7 +171,7 @@ def play(
     from syda_gym.agents.work import film
 
     options = scene.options() | {"physics_hz": physics_hz}
-    with _bar("Filming") as tell:
+    with interruptible("no film was written; run the command again"), _bar("Filming") as tell:
         figures = film(options, agent, out, clip=int(clip) if clip.isdigit() else clip, seed=seed, progress=tell)
     _print_figures({agent: figures}, f"Clip {clip}")
     _say(f"video: [bold]{out}[/]")
@@ -211,6 +211,16 @@ def _print_figures(rows: Mapping[str, Figures], title: str) -> None:
             f"{figures.objective:.2f}",
         )
     console().print(table)
+
+
+def _where_to_go_on(out: Path, kind: str) -> str:
+    """What an interrupted training left."""
+    if kind == "residual" and (out / "checkpoint.safetensors").is_file():
+        from syda_gym.agents.residual.checkpoint import load_checkpoint
+
+        steps = load_checkpoint(out / "checkpoint.safetensors")[1]["steps"]
+        return f"the checkpoint in {out} stands at {steps} steps; the same command with --resume goes on from there"
+    return "nothing was kept yet; run the command again"
 
 
 def _say(text: str) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from syda_gym.cli.shared import console, print_table, typed_command
+from syda_gym.cli.shared import console, interruptible, print_table, typed_command
 
 if TYPE_CHECKING:
     pass
@@ -47,9 +47,17 @@ def benchmark(
         typer.echo(yaml.safe_dump(settings.as_dict(), sort_keys=False), nl=False)
         return
     data = load_motions(settings.motions, settings.fps)
-    with _cells() as tell:
+    kept = f"finished cells are kept in {out}; the same command goes on from there"
+    with interruptible(kept), _cells() as (progress, inside):
         results = run_benchmark(
-            settings, out, workers=workers, motions=data, parquet=parquet, command=typed_command(), progress=tell
+            settings,
+            out,
+            workers=workers,
+            motions=data,
+            parquet=parquet,
+            command=typed_command(),
+            progress=progress,
+            inside=inside,
         )
     page = write_benchmark_report(results, data, out)
     if results.select(kind="episodes").rows:
@@ -107,10 +115,11 @@ def export_episodes(
     """Write episodes as a Minari data set, for offline learning (extra `data`)."""
     from syda_gym.evaluation.minari_export import export_minari
 
-    stored = export_minari(
-        name, motions=motions, route=route, method=method, agent=agent, disturbance=disturbance, episodes=episodes,
-        seed=seed, command=typed_command(),
-    )  # fmt: skip
+    with interruptible("no data set was written; run the command again"):
+        stored = export_minari(
+            name, motions=motions, route=route, method=method, agent=agent, disturbance=disturbance, episodes=episodes,
+            seed=seed, command=typed_command(),
+        )  # fmt: skip
     console().print(f"{stored.episodes} episodes, {stored.steps} steps: [bold]{stored.path}[/]", soft_wrap=True)
 
 
@@ -161,11 +170,18 @@ def _pair(text: str) -> tuple[str, str]:
 
 
 @contextmanager
-def _cells() -> Iterator[Callable[[int, int, str], None]]:
-    """A progress bar over cells."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+def _cells() -> Iterator[tuple[Callable[[int, int, str], None], Callable[[float, str], None]]]:
+    """A progress bar over cells that moves within them, too."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=console(stderr=True)) as progress:
-        task = progress.add_task("", total=None)
-        yield lambda done, count, name: progress.update(task, completed=done, total=count, description=name)
+    columns = (BarColumn(), TextColumn("{task.fields[cells]}"), TimeRemainingColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=console(stderr=True)) as bar:
+        task = bar.add_task("", total=None, cells="")
+        finished = 0
+
+        def progress(done: int, count: int, name: str) -> None:
+            nonlocal finished
+            finished = done
+            bar.update(task, completed=done, total=count, description=name, cells=f"{done}/{count}")
+
+        yield progress, lambda part, name: bar.update(task, completed=finished + part, description=name)

@@ -11,6 +11,7 @@ from syda_gym.cli.shared import (
     JsonOption,
     MotionsOption,
     SeedOption,
+    interruptible,
     print_json,
     print_table,
     stages,
@@ -43,7 +44,8 @@ def transferability(
     if validate:
         from syda_gym.evaluation.prediction.study import validate as measure_prediction
 
-        with stages({"fit": "Fitting every pair and fold", "chains": "Scoring every chain"}) as tell:
+        words = {"fit": "Fitting every pair and fold", "chains": "Scoring every chain"}
+        with interruptible("nothing was kept; run the command again"), stages(words) as tell:
             study = measure_prediction(
                 motions, bodies=bodies or None, folds=folds, max_hops=max_hops, seed=seed, progress=tell
             )

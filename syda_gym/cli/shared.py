@@ -14,11 +14,13 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 __all__ = [
+    "Interrupted",
     "JsonOption",
     "MotionsOption",
     "OutOption",
     "SeedOption",
     "console",
+    "interruptible",
     "print_json",
     "print_table",
     "stages",
@@ -32,6 +34,23 @@ MotionsOption = Annotated[
 OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder to write to; created if need be.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
+
+
+class Interrupted(BaseException):
+    """A command was stopped; the message says where to go on. No ``KeyboardInterrupt``, which Typer would swallow."""
+
+
+@contextmanager
+def interruptible(where: str | Callable[[], str]) -> Iterator[None]:
+    """Turns Ctrl-C inside the block into one line.
+
+    Args:
+        where: what was kept and how to go on, or a function that says so once it is known.
+    """
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        raise Interrupted(where if isinstance(where, str) else where()) from stop
 
 
 def console(*, stderr: bool = False) -> Console:

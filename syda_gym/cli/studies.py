@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +14,7 @@ from syda_gym.cli.shared import (
     OutOption,
     SeedOption,
     console,
+    interruptible,
     print_table,
     stages,
     typed_command,
@@ -39,7 +42,10 @@ def demo(
         "residual": "Training the residual policy",
         "report": "Drawing the report",
     }
-    with stages(words) as tell:
+    with (
+        interruptible(f"nothing half-written is in {out}; run the demo again, it takes about a minute"),
+        stages(words) as tell,
+    ):
         result = run_demo(
             motions, out, robot=robot or None, seed=seed, residual=residual, command=typed_command(), progress=tell
         )
@@ -68,7 +74,8 @@ def reproduce_paper(
     from syda_gym.evaluation.paper.study import reproduce
     from syda_gym.motions.clip import PROTOCOLS
 
-    with stages({"study": "Fitting and scoring"}) as tell:
+    kept = f"finished parts are kept in {out}; the same command goes on from there"
+    with interruptible(kept), _parts() as (progress, inside):
         study = reproduce(
             motions,
             out,
@@ -76,10 +83,38 @@ def reproduce_paper(
             protocols=tuple(protocol) if protocol else PROTOCOLS,
             contenders=method,
             workers=workers,
-            progress=lambda fraction, _: tell("study", fraction),
+            progress=progress,
+            inside=inside,
         )
     for table in tables(study):
         print_table(table)
     for name, reason in study.skipped.items():
         console(stderr=True).print(f"left out {name}: {reason}", markup=False)
+    for name, trace in study.failed.items():
+        last = trace.strip().splitlines()[-1]
+        console(stderr=True).print(f"failed: {name}: {last}", style="red", markup=False, soft_wrap=True)
     console(stderr=True).print(f"tables, plots and study.json are in {out}", markup=False)
+    if study.failed:
+        raise typer.Exit(code=1)
+
+
+@contextmanager
+def _parts() -> Iterator[tuple[Callable[[float, str], None], Callable[[float, str], None]]]:
+    """A progress bar that moves within parts, too, and names the part that is being computed."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        BarColumn(),
+        TextColumn("{task.percentage:>5.1f} %"),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}"),
+    )
+    with Progress(*columns, console=console(stderr=True)) as bar:
+        task = bar.add_task("reading", total=1.0)
+
+        def finished(fraction: float, name: str) -> None:
+            bar.update(task, completed=fraction, description=name)
+            if not bar.console.is_terminal:
+                bar.console.print(f"{100 * fraction:5.1f} %  {name}", markup=False, highlight=False)
+
+        yield finished, lambda fraction, name: bar.update(task, completed=fraction, description=name)
