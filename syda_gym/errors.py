@@ -46,7 +46,7 @@ class OptionError(SydaError, ValueError):
 
 
 class UnknownOptionError(OptionError, TypeError):
-    """There is no option of that name; a ``TypeError`` in Python's own wording as well, which other libraries look for."""
+    """No option has that name; a ``TypeError`` in Python's own wording as well, which other libraries look for."""
 
 
 class StorageError(SydaError, OSError):

@@ -29,9 +29,9 @@ def test_a_second_writer_is_told_who_has_the_folder(tmp_path):
     assert holder.stdout is not None
     try:
         assert holder.stdout.readline() == "held\n"
-        with pytest.raises(StorageError, match=f"being written by process {holder.pid} on ") as caught:
-            with locked_folder(tmp_path):
-                pytest.fail("two writers")
+        words = f"being written by process {holder.pid} on "
+        with pytest.raises(StorageError, match=words) as caught, locked_folder(tmp_path):
+            pytest.fail("two writers")
         assert re.search(r"choose another folder", str(caught.value))
     finally:
         holder.send_signal(signal.SIGKILL)

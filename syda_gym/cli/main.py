@@ -41,14 +41,17 @@ def main() -> None:
     except SydaError as error:
         console(stderr=True).print(f"error: {error}", style="bold red", markup=False, highlight=False, soft_wrap=True)
         sys.exit(2)
-    except (Interrupted, KeyboardInterrupt) as interrupt:
+    except Interrupted as interrupt:
         _say_interrupted(str(interrupt))
-        sys.exit(128 + (stopped_by or [signal.SIGINT])[0])
+        sys.exit(128 + interrupt.signal)
     except SystemExit as end:
         if end.code == 128 + signal.SIGINT:  # Typer's own answer to Ctrl-C, which says nothing
             _say_interrupted("nothing was kept; run the command again")
             sys.exit(128 + (stopped_by or [signal.SIGINT])[0])
         raise
+    except KeyboardInterrupt:
+        _say_interrupted("")
+        sys.exit(128 + (stopped_by or [signal.SIGINT])[0])
 
 
 def _say_interrupted(where: str) -> None:

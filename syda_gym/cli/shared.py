@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -37,20 +39,56 @@ SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything rand
 
 
 class Interrupted(BaseException):
-    """A command was stopped; the message says where to go on. No ``KeyboardInterrupt``, which Typer would swallow."""
+    """A command was stopped; the message says where to go on. No ``KeyboardInterrupt``, which Typer would swallow.
+
+    Attributes:
+        signal: number of the signal that stopped it.
+    """
+
+    def __init__(self, where: str, number: int) -> None:
+        super().__init__(where)
+        self.signal = number
+
+
+_REPEAT_SECONDS = 6.0  # longer than a pool needs to end deaf workers
 
 
 @contextmanager
 def interruptible(where: str | Callable[[], str]) -> Iterator[None]:
-    """Turns Ctrl-C inside the block into one line.
+    """Turns Ctrl-C and a request to terminate inside the block into one line.
+
+    An exception is lost where Python cannot raise it, in a callback or a destructor; so an interrupt that did not end
+    the block is repeated.
 
     Args:
         where: what was kept and how to go on, or a function that says so once it is known.
     """
+    stopped_by: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        stopped_by.append(number)
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, _REPEAT_SECONDS)
+        raise KeyboardInterrupt
+
+    names = [name for name in ("SIGINT", "SIGTERM", "SIGALRM") if hasattr(signal, name)]
+    try:
+        before = {name: signal.signal(getattr(signal, name), stop) for name in names}
+    except ValueError:  # not the main thread, which alone may listen: somebody else decides there
+        yield
+        return
     try:
         yield
-    except KeyboardInterrupt as stop:
-        raise Interrupted(where if isinstance(where, str) else where()) from stop
+    except KeyboardInterrupt as interrupt:
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        text = where if isinstance(where, str) else where()
+        raise Interrupted(text, (stopped_by or [signal.SIGINT])[0]) from interrupt
+    finally:
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        for name, handler in before.items():
+            signal.signal(getattr(signal, name), handler or signal.SIG_DFL)
 
 
 def console(*, stderr: bool = False) -> Console:

@@ -49,8 +49,8 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         autoreset_mode: ``next_step`` (Gymnasium's default: the step after the end of an episode resets the robot and
             ignores its action), ``same_step`` (the last observation is in ``infos["final_obs"]``), or ``disabled``
             (call ``reset(options={"reset_mask": mask})``).
-        max_episode_steps: cuts episodes off (``truncated``) after so many steps, as ``gymnasium.make`` does by a wrapper;
-            ``is_success`` then judges the steps until there.
+        max_episode_steps: cuts episodes off (``truncated``) after so many steps, as ``gymnasium.make`` does by a
+            wrapper; ``is_success`` then judges the steps until there.
         options: options, ``None`` for the defaults.
         **changes: single options, as in ``SydaTeleopEnv``.
 

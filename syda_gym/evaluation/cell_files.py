@@ -1,4 +1,4 @@
-"""Cell files: finished pieces of long work, one file each, that are taken again only if they are what they should be."""
+"""Cell files: finished pieces of long work, one file each, taken again only if they are what they should be."""
 
 from __future__ import annotations
 

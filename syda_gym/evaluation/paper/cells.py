@@ -138,7 +138,7 @@ class CellTask:
         return self.contender.cost * (3.0 if self.protocol == "loao" else 1.0)
 
     def compute(self, tell: Tell = lambda fraction: None) -> dict[str, Any] | str:
-        """The cell's figures, or the message of a missing optional dependency; ``tell`` is told the finished fraction."""
+        """The cell's figures, or the message of a missing optional dependency; ``tell`` hears the finished fraction."""
         import torch
 
         torch.set_num_threads(1)
