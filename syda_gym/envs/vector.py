@@ -246,7 +246,7 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
 
 
 def _is_whole(value: Any, least: int) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool) and value >= least
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and int(value) >= least
 
 
 def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
