@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tempfile
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -39,19 +39,27 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     final = Path(path)
     try:
         final.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{final.stem}-", suffix=final.suffix, dir=final.parent)
-        os.close(handle)
+        temporary = _fresh(final)
     except OSError as error:
         raise StorageError(f"cannot write {final}: {error.strerror}; choose a folder you may write") from error
-    temporary = Path(name)
     try:
         yield temporary
-        os.chmod(temporary, 0o644)  # mkstemp makes private files; results are meant to be shared
         os.replace(temporary, final)
     except OSError as error:
         raise StorageError(f"cannot write {final}: {error}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _fresh(final: Path) -> Path:
+    """A new empty file beside ``final``, with the permissions that the user's umask gives to any file."""
+    while True:
+        path = final.with_name(f".{final.stem}-{secrets.token_hex(6)}{final.suffix}")
+        try:
+            os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        except FileExistsError:
+            continue
+        return path
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> Path:

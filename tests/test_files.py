@@ -1,3 +1,5 @@
+import os
+
 import pytest
 
 from syda_gym.errors import MissingExtraError, StorageError, SydaError, nearest_name
@@ -47,3 +49,14 @@ def test_errors_name_the_remedy():
     assert "did you mean 'kid'" in nearest_name("kidd", ["kid", "adult"])
     assert issubclass(StorageError, SydaError)
     assert issubclass(StorageError, OSError)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions as POSIX knows them")
+@pytest.mark.parametrize("mask", [0o022, 0o077, 0o002])
+def test_files_keep_the_users_umask(tmp_path, mask):
+    before = os.umask(mask)
+    try:
+        path = write_text(tmp_path / "note.txt", "hello")
+    finally:
+        os.umask(before)
+    assert path.stat().st_mode & 0o777 == 0o666 & ~mask

@@ -29,6 +29,7 @@ from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.envs.teleop import SydaTeleopEnv
 from syda_gym.errors import AgentError, nearest_name
 from syda_gym.files import asset
+from syda_gym.locks import locked_folder
 from syda_gym.mappings.mapping import Mapping as MotionMapping
 from syda_gym.mappings.storage import save_mapping
 
@@ -88,12 +89,24 @@ def train_agent(
         progress: called with the share that is done.
 
     Raises:
-        SydaError: bad options, nothing to resume, a bundle that does not fit.
+        SydaError: bad options, nothing to resume, a bundle that does not fit, a folder that another process writes.
     """
     settings = config or ResidualConfig()
-    folder = Path(out)
     if resume and isinstance(settings, ResidualConfig):
-        load_checkpoint(folder / "checkpoint.safetensors")  # before minutes of fitting and recording are spent
+        load_checkpoint(Path(out) / "checkpoint.safetensors")  # before minutes of fitting and recording are spent
+    with locked_folder(out, "agent") as folder:
+        return _train(options, folder, settings, base, seed, resume, progress)
+
+
+def _train(
+    options: TeleopOptions | Mapping[str, Any],
+    folder: Path,
+    settings: ResidualConfig | PredictorConfig,
+    base: str | os.PathLike[str],
+    seed: int,
+    resume: bool,
+    progress: Progress | None,
+) -> TrainingReport:
     ground = Ground(options)
     if isinstance(settings, PredictorConfig):
         below = find_agent(base, ground.interface)

@@ -31,7 +31,7 @@ from syda_gym.cli.options import (
     mapping_of,
     route_of,
 )
-from syda_gym.cli.shared import bar, print_json, say_written, show_table
+from syda_gym.cli.shared import bar, interruptible, print_json, say_written, show_table
 
 if TYPE_CHECKING:
     from syda_gym.agents.figures import Figures
@@ -174,7 +174,7 @@ def train(
         make = ResidualConfig.preset if config in CONFIGS else ResidualConfig.read
         settings = make(config, **changes, **({"steps": steps} if steps else {}))
     options = scene.options(training=True)
-    with bar("Training") as tell:
+    with interruptible(lambda: _where_to_go_on(out, kind)), bar("Training") as tell:
         report = train_agent(options, out, config=settings, base=base, seed=seed, resume=resume, progress=tell)
     rows = {}
     for place, (step, figures, below) in enumerate(report.history):
@@ -211,7 +211,7 @@ def evaluate(
         env = SydaTeleopEnv(**options)
         chosen = list(np.linspace(0, len(env.clip_names) - 1, clips).round().astype(int).tolist())
         env.close()
-    with bar("Playing") as tell:
+    with interruptible("nothing was kept; run the command again"), bar("Playing") as tell:
         results = compare_agents(options, agents, clips=chosen, draws=draws, seed=seed, progress=tell)
     count = len(next(iter(results.values())))
     means = mean_table(results)
@@ -239,7 +239,7 @@ def play(
     from syda_gym.agents.work import film
 
     options = scene.options() | {"physics_hz": physics_hz}
-    with bar("Filming") as tell:
+    with interruptible("no film was written; run the command again"), bar("Filming") as tell:
         figures = film(options, agent, out, clip=int(clip) if clip.isdigit() else clip, seed=seed, progress=tell)
     _print_figures({agent: figures}, f"Clip {clip}")
     say_written("video", out)
@@ -283,3 +283,13 @@ def _print_figures(rows: Mapping[str, Figures], title: str) -> None:
         for name, figures in rows.items()
     )
     show_table(headings, cells, title=title, note=OBJECTIVE)
+
+
+def _where_to_go_on(out: Path, kind: str) -> str:
+    """What an interrupted training left."""
+    if kind == "residual" and (out / "checkpoint.safetensors").is_file():
+        from syda_gym.agents.residual.checkpoint import load_checkpoint
+
+        steps = load_checkpoint(out / "checkpoint.safetensors")[1]["steps"]
+        return f"the checkpoint in {out} stands at {steps} steps; the same command with --resume goes on from there"
+    return "nothing was kept yet; run the command again"

@@ -23,7 +23,7 @@ from syda_gym.cli.options import (
     ends_of,
     pairs_of,
 )
-from syda_gym.cli.shared import print_json, print_table, stages
+from syda_gym.cli.shared import interruptible, print_json, print_table, stages
 
 __all__ = ["route", "transferability"]
 
@@ -53,7 +53,8 @@ def transferability(
     if validate:
         from syda_gym.evaluation.prediction.study import validate as measure_prediction
 
-        with stages({"fit": "Fitting every pair and fold", "chains": "Scoring every chain"}) as tell:
+        words = {"fit": "Fitting every pair and fold", "chains": "Scoring every chain"}
+        with interruptible("nothing was kept; run the command again"), stages(words) as tell:
             study = measure_prediction(
                 motions, bodies=bodies or None, folds=folds, max_hops=max_hops or 3, seed=seed, progress=tell
             )

@@ -208,7 +208,8 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     * v0: first version.
 
     Raises:
-        OptionError: an unknown option or a value outside what is allowed; the message lists what is.
+        UnknownOptionError: an unknown option (a ``TypeError``, too); the message says which is nearest.
+        OptionError: a value outside what is allowed; the message lists what is.
         RouteError: no such route.
         MotionError: motions that cannot be read, or in which operator and robot do not occur together.
         MappingError: a mapping between other bodies.
@@ -267,7 +268,9 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
         Raises:
             OptionError: unknown options or values.
             RouteError: the route cannot be taken.
+            SydaError: the environment is closed.
         """
+        self._check_open("reset")
         super().reset(seed=seed)
         wish = wishes(self._fleet.repertoire, options, 1)
         observation, info = self._fleet.begin(self.np_random, wish[0])
@@ -285,8 +288,9 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
 
         Raises:
             OptionError: wrong shape or values that are not finite.
-            SydaError: not reset yet.
+            SydaError: not reset yet, or closed.
         """
+        self._check_open("step")
         if not self._started:
             raise SydaError("step was called before reset; call reset first")
         result = self._fleet.play(action)
@@ -302,13 +306,14 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
             or reset. ``human``: nothing; the window is kept up to date by ``reset`` and ``step``.
 
         Raises:
-            SydaError: not reset yet.
+            SydaError: not reset yet, or closed.
         """
         if self.render_mode is None:
             gymnasium.logger.warn(
                 "render() does nothing without a render mode; make the environment with render_mode='rgb_array'"
             )
             return None
+        self._check_open("render")
         if not self._started:
             raise SydaError("render was called before reset; call reset first")
         if self.render_mode == "rgb_array_list":
@@ -318,6 +323,7 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
 
     def close(self) -> None:
         """Releases physics, camera and window; harmless when repeated."""
+        self._released = True
         self._fleet.close()
         self._painter.close()
 

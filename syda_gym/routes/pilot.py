@@ -85,6 +85,7 @@ class Pilot:
         self.preset, self.held_out, self.seed = preset, tuple(sorted(held_out)), seed
         self._given: Mapping | None = None
         self._stored: dict[tuple[str, str], Mapping] = {}
+        self._chains: dict[tuple[str, ...], Mapping] = {}  # finding a fit again takes a hash of all its frames
         self._method = ""
         for body in via or ():
             if body not in motions.bodies:
@@ -137,8 +138,15 @@ class Pilot:
 
         if self._given is not None:
             return self._given
-        links = [self._link(a, b) for a, b in zip(bodies[:-1], bodies[1:], strict=True)]
-        return links[0] if len(links) == 1 else ChainMapping(links)
+        route = tuple(bodies)
+        if route not in self._chains:
+            links = [self._link(a, b) for a, b in zip(route[:-1], route[1:], strict=True)]
+            self._chains[route] = links[0] if len(links) == 1 else ChainMapping(links)
+        return self._chains[route]
+
+    def __getstate__(self) -> dict[str, object]:
+        # Mappings are found again where the pilot is unpickled; they are larger than everything else together.
+        return {**self.__dict__, "_chains": {}}
 
     def _take(self, mapping: Mapping) -> None:
         ends = (mapping.source.name, mapping.target.name)

@@ -13,7 +13,7 @@ import numpy as np
 from syda_gym.embodiments.embodiment import Embodiment
 from syda_gym.envs.task.disturbances import Disturbances
 from syda_gym.envs.task.tracking import RewardWeights
-from syda_gym.errors import OptionError, nearest_name
+from syda_gym.errors import OptionError, UnknownOptionError, nearest_name
 from syda_gym.motions.clip import Motions
 from syda_gym.simulation.backend import BACKENDS
 from syda_gym.simulation.pictures.camera import CameraView
@@ -102,12 +102,15 @@ class TeleopOptions:
         """Options with some of them changed.
 
         Raises:
-            OptionError: an unknown option; the message says which is nearest.
+            UnknownOptionError: an unknown option; the message says which is nearest.
         """
         known = [field.name for field in fields(cls)]
         for name in changes:
             if name not in known:
-                raise OptionError(f"unknown option {name!r}; {nearest_name(name, known)}")
+                # In Python's words: TorchRL, for one, tries keywords and looks for this text.
+                raise UnknownOptionError(
+                    f"unknown option: got an unexpected keyword argument {name!r}; {nearest_name(name, known)}"
+                )
         values = {} if options is None else {name: getattr(options, name) for name in known}
         return cls(**{**values, **changes})
 

@@ -16,6 +16,7 @@ __all__ = ["BenchmarkConfig", "EfficiencyConfig", "split_method"]
 
 _MAX_BYTES = 2**20
 _MAX_SEEDS = 10_000
+_MAX_DRAWS = 1_000
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class EfficiencyConfig:
     def __post_init__(self) -> None:
         object.__setattr__(self, "chain", _route(self.chain))
         object.__setattr__(self, "actions", _whole_numbers("efficiency.actions", self.actions, 1))
-        _whole("efficiency.draws", self.draws, 1)
+        _whole("efficiency.draws", self.draws, 1, _MAX_DRAWS)
         split_method(self.method)
         if len(self.chain) < 3 or self.new_body not in (self.chain[0], self.chain[-1]):
             raise OptionError(
@@ -264,9 +265,11 @@ def _route(value: Any) -> Route:
     return bodies
 
 
-def _whole(what: str, value: Any, low: int) -> None:
+def _whole(what: str, value: Any, low: int, high: int | None = None) -> None:
     if isinstance(value, bool) or not isinstance(value, int) or value < low:
         raise OptionError(f"{what} must be a whole number of at least {low}, got {value!r}")
+    if high is not None and value > high:
+        raise OptionError(f"{what} must be at most {high}, got {value!r}")
 
 
 def _whole_numbers(what: str, values: Any, low: int) -> tuple[int, ...]:

@@ -12,6 +12,7 @@ from syda_gym.errors import SydaError
 from syda_gym.evaluation.benchmark.compare import compare
 from syda_gym.evaluation.benchmark.efficiency import EfficiencyCurve, efficiency_curve, models_plot
 from syda_gym.evaluation.benchmark.results import Results
+from syda_gym.evaluation.cell_files import read_cell
 from syda_gym.evaluation.report import (
     BarPlot,
     Column,
@@ -29,7 +30,6 @@ from syda_gym.evaluation.report import (
 )
 from syda_gym.evaluation.report.model import Block, Cell
 from syda_gym.evaluation.statistics import iqm, spearman
-from syda_gym.files import read_json
 from syda_gym.motions.clip import Motions
 
 __all__ = ["differences_table", "summary_table", "write_benchmark_report"]
@@ -248,9 +248,9 @@ def _playback(results: Results, motions: Motions) -> Playback | None:
     several = len(results.about["config"]["methods"]) > 1
     for key in results.about["cells"]:
         path = results.folder / "cells" / f"{key}.json"
-        if len(chains) >= _MOST_SHOWN or not path.is_file():
+        stored = read_cell(path, key) if len(chains) < _MOST_SHOWN else None
+        if stored is None:
             continue
-        stored = read_json(path)
         cell = stored["cell"]
         name = (">".join(cell["route"]), cell["method"])
         if name in seen or not stored.get("shown"):

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from syda_gym.embodiments.robot import Robot
-from syda_gym.errors import OptionError, StorageError, nearest_name
+from syda_gym.errors import OptionError, nearest_name
 from syda_gym.evaluation.chains import Links, Route, action_groups, all_routes, robots_of
 from syda_gym.evaluation.demo.results import ChainResult, DemoResult
 from syda_gym.evaluation.episodes import EpisodeFigures, Recording, figures_of_all, latency, make_env, play_all
+from syda_gym.locks import locked_folder
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
 
@@ -60,9 +61,22 @@ def run_demo(
     Raises:
         SydaError: unusable motions or folder; nothing half-written stays behind.
     """
+    tell = progress or (lambda stage, done: None)
+    with locked_folder(out) as folder:
+        return _run(motions, folder, robot, seed, residual, command, tell)
+
+
+def _run(
+    motions: str | os.PathLike[str] | Motions,
+    folder: Path,
+    robot: str | None,
+    seed: int,
+    residual: bool,
+    command: str,
+    tell: Progress,
+) -> DemoResult:
     from syda_gym.evaluation.demo.report import write_demo_report
 
-    tell = progress or (lambda stage, done: None)
     clock = _Clock(tell)
     with clock("load"):
         data = load_motions(motions)
@@ -72,7 +86,6 @@ def run_demo(
         routes = all_routes(data, operators, [driven.name], 2, via=bodies)
         operators = list(dict.fromkeys(route[0] for route in routes))
         groups = _groups(data, operators[0], driven.name, seed)
-        folder = _folder(out)  # after whatever can be refused, so that a refusal leaves nothing
     with clock("transferability"):
         links, paper_links = _measure(data, routes, tell)
         products = {route: float(np.prod([links[edge].T for edge in _edges(route)])) for route in routes}
@@ -128,19 +141,6 @@ class _Clock:
         self.seconds[self._stage] = time.perf_counter() - self._start
         if error[0] is None:
             self._tell(self._stage, 1.0)
-
-
-def _folder(out: str | os.PathLike[str]) -> Path:
-    """The output folder, made and tried before minutes of work are spent."""
-    folder = Path(out)
-    probe = folder / ".writable"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise StorageError(f"cannot write into {folder}: {error.strerror}; choose another folder with --out") from error
-    return folder
 
 
 def _robot(motions: Motions, name: str | None) -> Robot:

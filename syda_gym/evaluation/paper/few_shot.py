@@ -7,8 +7,8 @@ every action unseen by whatever leads into the robot.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Dict
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,7 +47,14 @@ class FewShotRow:
 
 
 def few_shot(
-    motions: Motions, newcomer: str, known: str, robot: str, *, draws: int = 10, counts: Sequence[int] = COUNTS
+    motions: Motions,
+    newcomer: str,
+    known: str,
+    robot: str,
+    *,
+    draws: int = 10,
+    counts: Sequence[int] = COUNTS,
+    progress: Callable[[float], None] | None = None,
 ) -> list[FewShotRow]:
     """Compares the chain newcomer > known > robot with the direct pair newcomer > robot.
 
@@ -62,6 +69,7 @@ def few_shot(
         robot: where both lead.
         draws: random choices of the k actions, each with a seed of its own.
         counts: the k to try; those beyond the number of recorded actions are left out.
+        progress: told the finished fraction.
 
     Returns:
         One row per k.
@@ -84,7 +92,10 @@ def few_shot(
     tests = {name: end.only_actions([name]) for name in actions}
     most = min(len(hop_pair.action_names), len(end.action_names) - 1)
     rows = []
-    for count in (k for k in counts if k <= most):
+    tried = [k for k in counts if k <= most]
+    for place, count in enumerate(tried):
+        if progress is not None:
+            progress(place / len(tried))
         chains = _chain_errors(hop_pair, links, tests, count, draws)
         direct = _direct_errors(end, tests, count, draws)
         rows.append(

@@ -252,6 +252,7 @@ def write_study(study: Study, out: str | os.PathLike[str], about: dict[str, str]
             "data": study.data,
             "seeds": study.seeds,
             "skipped": study.skipped,
+            "failed": study.failed,
             "versions": about,
             "cells": cells,
             "few_shot": study.few_shot,
