@@ -12,6 +12,7 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MotionError, OptionError, TeleoperationError, nearest_name
 from syda_gym.motions.clip import MotionClip
 from syda_gym.motions.loading import load_motions
+from syda_gym.teleoperation.incoming.camera import CameraSource, FilmSource
 from syda_gym.teleoperation.incoming.sources import ReplaySource, Source, UdpSource, WebSocketSource
 from syda_gym.teleoperation.outgoing.sinks import ManySinks, MemorySink, Sink, UdpSink
 
@@ -21,6 +22,8 @@ SOURCES = {
     "replay": "replay:SPEC plays a recording at its own speed; SPEC is embedded, format:PATH or a path",
     "udp": "udp[:HOST]:PORT listens for JSON packets",
     "ws": "ws[:HOST]:PORT serves a WebSocket for the same packets",
+    "camera": "camera[:N] follows the person in front of a camera of this machine",
+    "film": "film:FILE.mp4 follows the person in a film",
 }
 """Kinds of sources and how they are written."""
 
@@ -47,6 +50,7 @@ def make_source(
     calibration: float = 2.0,
     repeat: bool = False,
     origins: tuple[str, ...] = (),
+    model: str | os.PathLike[str] | None = None,
 ) -> Source:
     """A source from its address.
 
@@ -59,6 +63,7 @@ def make_source(
         calibration: seconds of standing that a replay begins with, for the loop's calibration.
         repeat: whether a replay begins again at its end.
         origins: web pages that may connect to a WebSocket.
+        model: file of the pose model of cameras and films; ``None`` for the default place.
 
     Raises:
         OptionError: no such kind of source, or a port that is none.
@@ -74,6 +79,14 @@ def make_source(
     if kind == "ws":
         host, port = _host_and_port(rest, 9871)
         return WebSocketSource(body, host, port, token, origins)
+    if kind == "camera":
+        if rest and not (rest.isascii() and rest.isdigit()):
+            raise OptionError(f"expected camera or camera:NUMBER such as camera:0, got {spec!r}")
+        return CameraSource(body, int(rest or 0), model=model)
+    if kind == "film":
+        if not rest:
+            raise OptionError("expected film:FILE such as film:wave.mp4")
+        return FilmSource(body, rest, speed=speed, repeat=repeat, stand=_STAND * calibration, model=model)
     raise OptionError(f"unknown source {spec!r}; {nearest_name(kind, SOURCES)}")
 
 

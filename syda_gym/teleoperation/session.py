@@ -44,6 +44,7 @@ def teleoperate(
     actions: Sequence[str] = (),
     repeat: bool = False,
     origins: tuple[str, ...] = (),
+    model: str | os.PathLike[str] | None = None,
     journal: str | os.PathLike[str] | None = None,
     note: dict[str, Any] | None = None,
     seconds: float | None = None,
@@ -62,6 +63,7 @@ def teleoperate(
         actions: that a replay plays.
         repeat: whether a replay begins again.
         origins: web pages that may connect to a WebSocket.
+        model: file of the pose model of cameras and films; ``None`` for the default place.
         journal: file to write every decision to.
         note: free facts for the journal.
         seconds: when to end.
@@ -82,7 +84,7 @@ def teleoperate(
         if isinstance(source, Source)
         else make_source(
             source, mapping.source, token=token, speed=speed, actions=actions, calibration=chosen.calibration,
-            repeat=repeat, origins=origins,
+            repeat=repeat, origins=origins, model=model,
         )
     )  # fmt: skip
     probe = TeleoperationLoop(mapping, chosen)
