@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from syda_gym.cli.shared import console
+from syda_gym.cli.shared import DEFAULT_VIEW, AppearanceOption, ViewAddressOption, ViewOption, console
 
 if TYPE_CHECKING:
     from syda_gym.agents.figures import Figures
@@ -164,6 +164,9 @@ def play(
     clip: Annotated[str, typer.Option(help="Name or number of the clip.")] = "0",
     physics_hz: Annotated[float, typer.Option(help="Physics steps per second.")] = 240.0,
     seed: SeedOption = 0,
+    view: ViewOption = False,
+    view_address: ViewAddressOption = DEFAULT_VIEW,
+    appearance: AppearanceOption = None,
     *,
     scene: Scene,
 ) -> None:
@@ -171,6 +174,14 @@ def play(
     from syda_gym.agents.work import film
 
     options = scene.options() | {"physics_hz": physics_hz}
+    if view:
+        from syda_gym.agents.work import play_episode
+        from syda_gym.cli.viewing import view_episode
+
+        played = play_episode(options, agent, clip=int(clip) if clip.isdigit() else clip, seed=seed)
+        _print_figures({agent: played.figures}, f"Clip {clip}")
+        view_episode(played, f"{agent}, clip {clip}", view_address, appearance)
+        return
     with _bar("Filming") as tell:
         figures = film(options, agent, out, clip=int(clip) if clip.isdigit() else clip, seed=seed, progress=tell)
     _print_figures({agent: figures}, f"Clip {clip}")

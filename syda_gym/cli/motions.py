@@ -7,9 +7,7 @@ from typing import Annotated
 
 import typer
 
-from syda_gym.cli.shared import (
-    console,
-)
+from syda_gym.cli.shared import DEFAULT_VIEW, ViewAddressOption, ViewOption, console
 
 __all__ = ["motions_app"]
 
@@ -21,6 +19,8 @@ def _motions_info(
     spec: Annotated[str, typer.Argument(help="`embedded`, `format:PATH`, or a path.", metavar="SPEC")],
     picture: Annotated[Path | None, typer.Option(help="PNG to draw stick figures into.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    view: ViewOption = False,
+    view_address: ViewAddressOption = DEFAULT_VIEW,
 ) -> None:
     """Say what a recording holds: bodies, actions, rate, gaps, and the units and axes that were found."""
     import json
@@ -70,6 +70,14 @@ def _motions_info(
         say.print(f"- {note}", markup=False)
     if picture is not None:
         say.print(f"picture: [bold]{picture}[/]")
+    if view:
+        from syda_gym.cli.viewing import view_motions
+        from syda_gym.motions import load_motions
+
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MotionWarning)
+            motions = load_motions(spec)
+        view_motions(motions, view_address)
 
 
 @motions_app.command("check")

@@ -14,10 +14,14 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 __all__ = [
+    "DEFAULT_VIEW",
+    "AppearanceOption",
     "JsonOption",
     "MotionsOption",
     "OutOption",
     "SeedOption",
+    "ViewAddressOption",
+    "ViewOption",
     "console",
     "print_json",
     "print_table",
@@ -31,6 +35,14 @@ MotionsOption = Annotated[
 ]
 OutOption = Annotated[Path, typer.Option("--out", "-o", help="Folder to write to; created if need be.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+DEFAULT_VIEW = "127.0.0.1:8099"
+ViewOption = Annotated[bool, typer.Option("--view", help="Show it live on a page in the browser (extra `view`).")]
+ViewAddressOption = Annotated[
+    str, typer.Option("--view-address", help="Where the page listens; port 0 takes any that is free.")
+]
+AppearanceOption = Annotated[
+    Path | None, typer.Option(help="Another URDF of the robot to show on the page, say the vendor's with meshes.")
+]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of everything random.", min=0)]
 
 

@@ -16,7 +16,7 @@ from syda_gym.teleoperation.incoming.camera import CameraSource, FilmSource
 from syda_gym.teleoperation.incoming.sources import ReplaySource, Source, UdpSource, WebSocketSource
 from syda_gym.teleoperation.outgoing.sinks import ManySinks, MemorySink, Sink, UdpSink
 
-__all__ = ["SINKS", "SOURCES", "make_sink", "make_source", "read_token"]
+__all__ = ["SINKS", "SOURCES", "host_and_port", "make_sink", "make_source", "read_token"]
 
 SOURCES = {
     "replay": "replay:SPEC plays a recording at its own speed; SPEC is embedded, format:PATH or a path",
@@ -74,10 +74,10 @@ def make_source(
         clips = _clips(rest or "embedded", body, actions)
         return ReplaySource(clips, speed=speed, repeat=repeat, stand=_STAND * calibration)
     if kind == "udp":
-        host, port = _host_and_port(rest, 9870)
+        host, port = host_and_port(rest, 9870)
         return UdpSource(body, host, port, token)
     if kind == "ws":
-        host, port = _host_and_port(rest, 9871)
+        host, port = host_and_port(rest, 9871)
         return WebSocketSource(body, host, port, token, origins)
     if kind == "camera":
         if rest and not (rest.isascii() and rest.isdigit()):
@@ -125,6 +125,20 @@ def read_token(path: str | os.PathLike[str] | None) -> str | None:
     return token
 
 
+def host_and_port(text: str, default: int) -> tuple[str, int]:
+    """``""``, ``PORT``, ``HOST:PORT`` or ``[IPv6]:PORT``.
+
+    Raises:
+        OptionError: something else.
+    """
+    host, _, port = text.rpartition(":")
+    if not port:
+        port = str(default)
+    if not port.isascii() or not port.isdigit():
+        raise OptionError(f"expected HOST:PORT or PORT such as 127.0.0.1:{default}, got {text!r}")
+    return host.strip("[]") or "127.0.0.1", int(port)
+
+
 def _sink(spec: str, robot: Robot, token: str | None, rate: float) -> Sink:
     from syda_gym.teleoperation.outgoing.bullet import BulletSink
 
@@ -136,23 +150,13 @@ def _sink(spec: str, robot: Robot, token: str | None, rate: float) -> Sink:
     if kind == "video":
         return BulletSink(robot, video=rest or "teleoperation.mp4", rate=rate)
     if kind == "udp":
-        host, port = _host_and_port(rest, 9880)
+        host, port = host_and_port(rest, 9880)
         return UdpSink(robot, host, port, token)
     if kind == "naoqi":
         from syda_gym.teleoperation.outgoing.naoqi import NaoqiSink
 
         return NaoqiSink(robot, rest or "tcp://127.0.0.1:9559")
     raise OptionError(f"unknown sink {spec!r}; {nearest_name(kind, SINKS)}")
-
-
-def _host_and_port(text: str, default: int) -> tuple[str, int]:
-    """``""``, ``PORT``, ``HOST:PORT`` or ``[IPv6]:PORT``."""
-    host, _, port = text.rpartition(":")
-    if not port:
-        port = str(default)
-    if not port.isascii() or not port.isdigit():
-        raise OptionError(f"expected HOST:PORT or PORT such as 127.0.0.1:{default}, got {text!r}")
-    return host.strip("[]") or "127.0.0.1", int(port)
 
 
 def _clips(spec: str, body: Embodiment, actions: Sequence[str]) -> list[MotionClip]:

@@ -18,7 +18,8 @@ JOINTS = {
 ARM_JOINTS = ("LShoulder", "LElbow", "LHand", "RShoulder", "RElbow", "RHand")
 
 BONES_SEEN = (
-    (11, 12), (11, 13), (13, 15), (12, 14), (14, 16), (11, 23), (12, 24), (23, 24), (23, 25), (25, 27), (24, 26), (26, 28),
+    (11, 12), (11, 13), (13, 15), (12, 14), (14, 16), (11, 23), (12, 24), (23, 24), (23, 25), (25, 27),
+    (24, 26), (26, 28),
 )  # fmt: skip
 """Landmarks to join by lines when a picture is shown."""
 
@@ -27,8 +28,8 @@ VISIBLE = 0.5
 
 _HELD_FOR = 1.0  # s; how long a hidden elbow or hand is believed to stay where it was
 _ROWS = [JOINTS[name] for name in ARM_JOINTS]
-# The picture's x, y, z (right, down, away from a camera that the person faces) to the recordings' (the subject's right,
-# up, backward): a person who faces the camera has the right hand at the picture's left.
+# The picture's x, y, z (right, down, away from a camera that is faced) to the recordings' (the subject's right,
+# right, up, backward): a person who faces the camera has the right hand at the picture's left.
 _TO_SUBJECT = np.array([-1.0, -1.0, 1.0])
 
 

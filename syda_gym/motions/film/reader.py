@@ -67,7 +67,9 @@ def read_film(path: str | Path, model: str | Path | None = None) -> Motions:
     notes = _without_hidden_arm(joints)
     notes += [f"a person is seen in {found} of {len(rows)} pictures"]
     return motions_from(
-        Recording(file, "film", joints, timestamps=np.array(times), up=(0.0, -1.0, 0.0), names=tuple(JOINTS), notes=notes)
+        Recording(
+            file, "film", joints, timestamps=np.array(times), up=(0.0, -1.0, 0.0), names=tuple(JOINTS), notes=notes
+        )
     )
 
 

@@ -345,7 +345,8 @@ class FilmSource(PictureSource):
         if not found:
             seconds = min(_PROBED_SECONDS, last / film.fps)
             raise MotionError(
-                f"{os.fspath(self.path)}: no person was found in the first {seconds:.0f} s; film one person, arms in view"
+                f"{os.fspath(self.path)}: no person was found in the first {seconds:.0f} s; film one person, "
+                "arms in view"
             )
         return _standing_like(np.stack(found))
 

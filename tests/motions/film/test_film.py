@@ -49,7 +49,7 @@ class TestHiddenJoints:
         hold = HiddenJoints()
         points, visibility = arm_frame(a_pose())
         assert hold(points, visibility, 0.0) is not None
-        moved = points + [0.3, 0.0, 0.0]
+        moved = points + np.array([0.3, 0.0, 0.0])
         moved[2] = 99.0
         _, hidden = arm_frame(a_pose(v15=0.1))
         result = hold(moved, hidden, 0.1)
