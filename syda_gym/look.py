@@ -10,6 +10,8 @@ __all__ = [
     "LIGHT_DIFFUSE",
     "LIGHT_FROM",
     "LIGHT_SPECULAR",
+    "NIGHT_GROUND",
+    "NIGHT_SKY",
     "OPERATOR",
     "PERSON",
     "REFERENCE",
@@ -39,6 +41,9 @@ LEFT, RIGHT = "#c44e52", "#4c72b0"
 GROUND: Colour = (0.80, 0.82, 0.85)
 SKY_TOP: Colour = (0.97, 0.98, 1.0)
 SKY_BOTTOM: Colour = (0.86, 0.89, 0.94)
+NIGHT_SKY: Colour = (0.098, 0.125, 0.165)
+NIGHT_GROUND: Colour = (0.16, 0.20, 0.25)
+"""The same on dark pages."""
 LIGHT_FROM = (1.5, 0.9, 2.2)
 """Where the light stands: before the scene, to its left, above."""
 LIGHT_AMBIENT, LIGHT_DIFFUSE, LIGHT_SPECULAR = 0.62, 0.40, 0.06

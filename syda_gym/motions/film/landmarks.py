@@ -41,8 +41,8 @@ def arm_frame(pose: Pose) -> tuple[FloatArray, FloatArray]:
 class HiddenJoints:
     """Holds elbows and hands that are hidden where they were last seen, relative to their shoulder.
 
-    An elbow that was never seen hangs down, and so does a hand. Confidence in an arm with a held joint falls from one to
-    zero within ``patience`` seconds. The better arm counts, for the robot's other arm stands still with what is held;
+    An elbow that was never seen hangs down, and so does a hand. Confidence in an arm with a held joint falls from 1 to
+    0 within ``patience`` seconds. The better arm counts, for the robot's other arm stands still with what is held;
     where both are hidden, the robot first slows and then stands still instead of guessing.
 
     Args:
