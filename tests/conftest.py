@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,9 @@ import pytest
 # `pytest --hypothesis-profile=default`.
 hypothesis.settings.register_profile("same-every-time", derandomize=True)
 hypothesis.settings.load_profile("same-every-time")
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
 
 
 @pytest.fixture(scope="session")
@@ -65,3 +69,22 @@ def person_film(tmp_path_factory: pytest.TempPathFactory) -> Path:
             yield cv2.warpAffine(picture, turn, (512, 512))
 
     return write_video(path, pictures(), 15.0)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """Headless Chromium; a test that needs it is skipped, loudly, where there is none."""
+    webdriver = pytest.importorskip("selenium.webdriver", reason="no selenium: browser tests are skipped")
+    if CHROMIUM is None or DRIVER is None:
+        pytest.skip("no chromium and chromedriver on this machine: pages were not tried in a browser")
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swiftshader",
+                     "--use-angle=swiftshader", "--window-size=1200,900", "--hide-scrollbars"):  # fmt: skip
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(service=Service(DRIVER), options=options)
+    yield driver
+    driver.quit()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import json
 import os
 import secrets
@@ -13,7 +14,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from syda_gym.errors import TeleoperationError
+from syda_gym.errors import MissingExtraError, TeleoperationError
 from syda_gym.simulation.page.plan import PagePlan
 
 __all__ = ["PageProcess"]
@@ -72,8 +73,11 @@ class PageProcess:
         """Starts the page and waits until it can be opened.
 
         Raises:
+            MissingExtraError: viser is not installed.
             TeleoperationError: it cannot be shown; the message says why.
         """
+        if importlib.util.find_spec("viser") is None:
+            raise MissingExtraError("the view", "view")
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         self._child = subprocess.Popen(
             [sys.executable, "-m", "syda_gym.simulation.page.child"],

@@ -84,7 +84,7 @@ def _guarded(gate: Gate) -> Iterator[None]:
 
             super().__init__(*args, process_request=process, **options)
 
-    module.serve = GuardedServe  # type: ignore[misc, assignment]
+    module.serve = GuardedServe  # type: ignore[misc]
     try:
         yield
     finally:
