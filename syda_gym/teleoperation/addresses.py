@@ -90,7 +90,14 @@ def make_source(
     raise OptionError(f"unknown source {spec!r}; {nearest_name(kind, SOURCES)}")
 
 
-def make_sink(specs: Sequence[str], robot: Robot, *, token: str | None = None, rate: float = 30.0) -> Sink:
+def make_sink(
+    specs: Sequence[str],
+    robot: Robot,
+    *,
+    token: str | None = None,
+    rate: float = 30.0,
+    operator: Embodiment | None = None,
+) -> Sink:
     """One sink, or several at once, from their addresses.
 
     Args:
@@ -98,11 +105,12 @@ def make_sink(specs: Sequence[str], robot: Robot, *, token: str | None = None, r
         robot: whose joints.
         token: secret that goes with UDP packets.
         rate: of a simulated robot [Hz].
+        operator: who is shown beside a simulated robot, see ``BulletSink.accompany``.
 
     Raises:
         OptionError: no such kind of sink.
     """
-    sinks = [_sink(spec, robot, token, rate) for spec in specs]
+    sinks = [_sink(spec, robot, token, rate, operator) for spec in specs]
     return sinks[0] if len(sinks) == 1 else ManySinks(sinks)
 
 
@@ -139,16 +147,16 @@ def host_and_port(text: str, default: int) -> tuple[str, int]:
     return host.strip("[]") or "127.0.0.1", int(port)
 
 
-def _sink(spec: str, robot: Robot, token: str | None, rate: float) -> Sink:
+def _sink(spec: str, robot: Robot, token: str | None, rate: float, operator: Embodiment | None) -> Sink:
     from syda_gym.teleoperation.outgoing.bullet import BulletSink
 
     kind, _, rest = spec.partition(":")
     if kind == "none":
         return MemorySink(limit=1)
     if kind in ("bullet", "window"):
-        return BulletSink(robot, window=kind == "window", rate=rate)
+        return BulletSink(robot, operator=operator, window=kind == "window", rate=rate)
     if kind == "video":
-        return BulletSink(robot, video=rest or "teleoperation.mp4", rate=rate)
+        return BulletSink(robot, operator=operator, video=rest or "teleoperation.mp4", rate=rate)
     if kind == "udp":
         host, port = host_and_port(rest, 9880)
         return UdpSink(robot, host, port, token)

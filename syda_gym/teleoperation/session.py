@@ -17,7 +17,7 @@ from syda_gym.teleoperation.journal import Journal
 from syda_gym.teleoperation.live_run import run
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
-from syda_gym.teleoperation.outgoing.sinks import Sink
+from syda_gym.teleoperation.outgoing.sinks import ManySinks, Sink
 from syda_gym.teleoperation.tick import Decision, LoopSettings
 
 __all__ = ["Session", "teleoperate"]
@@ -88,10 +88,13 @@ def teleoperate(
         )
     )  # fmt: skip
     probe = TeleoperationLoop(mapping, chosen)
-    sink = sinks if isinstance(sinks, Sink) else make_sink(sinks, probe.robot, token=token, rate=chosen.rate)
+    sink = sinks if isinstance(sinks, Sink) else make_sink(
+        sinks, probe.robot, token=token, rate=chosen.rate, operator=mapping.source
+    )  # fmt: skip
     with sink:
         start = _where(sink)
         loop = probe if start is None else TeleoperationLoop(mapping, chosen, start)
+        _show_operator(sink, loop)
         written = None if journal is None else Journal(Path(journal), loop, note)
         stats = LiveStatistics()
         try:
@@ -104,6 +107,14 @@ def teleoperate(
         finally:
             if written is not None:
                 written.close()
+
+
+def _show_operator(sink: Sink, loop: TeleoperationLoop) -> None:
+    """Lets films and windows ask for the operator's frames."""
+    for each in sink.sinks if isinstance(sink, ManySinks) else (sink,):
+        accompany = getattr(each, "accompany", None)
+        if accompany is not None:
+            accompany(lambda: loop.frame)
 
 
 def _where(sink: Sink) -> FloatArray | None:

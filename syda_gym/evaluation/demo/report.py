@@ -86,7 +86,7 @@ def write_demo_report(
                 Picture(
                     "Side by side",
                     (folder / "side_by_side.png").read_bytes(),
-                    variants={"dark": png_bytes(draw(shown, middle, labels=names, title=title, dark=True))},
+                    variants=_other_pages(shown, middle, names),
                 ),
                 Picture("Film", (folder / "chains.mp4").read_bytes(), "video/mp4"),
             ],
@@ -230,6 +230,15 @@ def _regions(result: DemoResult) -> Picture:
     narrow, narrow_dark = (clouds_png(*bodies, samples=2**18, width=3.5, dark=dark) for dark in (False, True))
     variants = {"dark": dark, "narrow": narrow, "narrow-dark": narrow_dark}
     return Picture(f"Where {result.robot.name} can move as {operator} does", png, variants=variants)
+
+
+def _other_pages(shown: Sequence[Track], frame: int, names: Sequence[str]) -> dict[str, bytes]:
+    """The bodies side by side for dark pages, and, with letters that can be read there, for phones."""
+    wide = png_bytes(draw(shown, frame, labels=names, dark=True))
+    narrow, narrow_dark = (
+        png_bytes(draw(shown, frame, size=(700, 560), labels=names, dark=dark)) for dark in (False, True)
+    )
+    return {"dark": wide, "narrow": narrow, "narrow-dark": narrow_dark}
 
 
 def _best_chain(result: DemoResult) -> ChainResult:

@@ -19,7 +19,7 @@ from syda_gym.simulation.page.plan import PagePlan
 
 __all__ = ["PageProcess"]
 
-_START = 60.0  # s; a busy machine takes long to import and to read meshes
+_START = 180.0  # s; a busy machine takes long to import and to read meshes
 
 
 class PageProcess:

@@ -61,7 +61,7 @@ def page(looks: Looks) -> Iterator[PageProcess]:
         yield opened
 
 
-def wait_until(true: Callable[[], bool], seconds: float = 30.0) -> None:
+def wait_until(true: Callable[[], bool], seconds: float = 120.0) -> None:
     end = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < end, "waited in vain"
@@ -70,7 +70,7 @@ def wait_until(true: Callable[[], bool], seconds: float = 30.0) -> None:
 
 def get(page: PageProcess, path: str, **headers: str) -> tuple[int, dict[str, str], bytes]:
     address = urlsplit(page.address)
-    connection = http.client.HTTPConnection(str(address.hostname), address.port, timeout=30.0)
+    connection = http.client.HTTPConnection(str(address.hostname), address.port, timeout=120.0)
     connection.request("GET", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
     response = connection.getresponse()
     result = response.status, {name.lower(): value for name, value in response.getheaders()}, response.read()
@@ -107,7 +107,7 @@ def test_a_strangers_page_cannot_open_the_socket(page: PageProcess) -> None:
     address = urlsplit(page.address)
     cookie = f"syda_gym_{address.port}=a-token-for-the-test"
     for origin, expected in (("http://evil.example", 403), (f"http://127.0.0.1:{address.port}", 101)):
-        with socket.create_connection((str(address.hostname), int(address.port or 0)), timeout=30.0) as link:
+        with socket.create_connection((str(address.hostname), int(address.port or 0)), timeout=120.0) as link:
             link.sendall(
                 (
                     f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{address.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"

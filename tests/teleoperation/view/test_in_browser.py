@@ -22,7 +22,7 @@ from syda_gym.teleoperation.view.cockpit import Cockpit
 
 pytest.importorskip("viser", reason="SKIPPED LOUDLY: the extra 'view' is not installed")
 
-_PATIENCE = 90.0  # s; a browser that draws in software on a busy machine is slow
+_PATIENCE = 180.0  # s; a browser that draws in software on a busy machine is slow
 
 
 def wait_until(true: Callable[[], Any], what: str) -> Any:
