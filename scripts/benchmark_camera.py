@@ -68,8 +68,10 @@ def measure(film: Path, model: Path | None, pictures: int) -> dict[str, float]:
             now = number / shots.fps
             marks = [time.process_time()]
             pose = see(shot.picture, now)
+            marks.append(time.process_time())
+            loop.rehearse()  # as the live loop does shortly before a frame is due
             # What follows runs in this thread alone; the model's own threads may still be winding down.
-            marks += [time.process_time(), time.thread_time()]
+            marks.append(time.thread_time())
             held = None if pose is None else hold(*arm_frame(pose), now)
             marks.append(time.thread_time())
             if held is None:
@@ -79,6 +81,7 @@ def measure(film: Path, model: Path | None, pictures: int) -> dict[str, float]:
             marks.append(time.thread_time())
             cockpit.update(decision)
             marks.append(time.thread_time())
+            loop.settle()  # and this once the command is out
             parts.append(np.delete(np.diff(marks), 1))
         shots.close()
     table = 1e3 * np.array(parts)
