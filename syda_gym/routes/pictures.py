@@ -142,7 +142,7 @@ def _draw_narrow(a: Workspace, b: Workspace, result: Transferability, definition
     return _png(figure)
 
 
-def _theme(dark: bool) -> dict[str, Any]:
+def _theme(dark: bool) -> Any:
     """Matplotlib's colours for a light or a dark page."""
     if not dark:
         return {"figure.facecolor": "white"}

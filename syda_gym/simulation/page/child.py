@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import signal
 import sys
 import threading
 from collections import deque
@@ -70,8 +71,10 @@ class _Page:
     def show(self, message: dict[str, Any]) -> None:
         """Shows what a message holds."""
         with self._server.atomic():
-            for name, values in message.get("poses", {}).items():
-                self._bodies[name].pose(values)
+            for name, body in self._bodies.items():
+                values = message.get("poses", {}).get(name)
+                if values is not None:
+                    body.pose(values)
             text = message.get("text")
             if text is not None and text != self._text.content:
                 self._text.content = text
@@ -143,6 +146,8 @@ class _Plot:
 
 def main() -> None:
     """Serves until the input ends."""
+    # Ctrl-C reaches every process of a terminal; this one ends when its input does, after the robot has come to rest.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     # What viser or a library prints must not mix with what this process tells.
     told = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)

@@ -175,7 +175,8 @@ class Cockpit:
                 angles = self._angles()
             except SydaError:  # the simulation has just been closed
                 self._angles = None
-        return angles.round(4).tolist()
+        rounded: list[float] = angles.round(4).tolist()
+        return rounded
 
     def _values(self, now: float, decision: Decision) -> list[list[float | None]]:
         self._frames.append((now, self._stats.frames))

@@ -168,9 +168,17 @@ class TestBadInput:
         with pytest.raises(TeleoperationError, match=r"the view cannot show .*wrong\.urdf"):
             PageProcess(plan(bodies=bodies), Looks()).open()
 
-    def test_a_urdf_of_another_robot_is_one_clear_error(self) -> None:
-        bodies = (body_plan(PEPPER, "robot", appearance=catalog.get("nao").urdf),)
-        with pytest.raises(TeleoperationError, match=r"no (movable joint|link)"):
+    def test_a_urdf_of_another_robot_is_one_clear_error(self, tmp_path: Path) -> None:
+        other = tmp_path / "other.urdf"
+        box = "<visual><geometry><box size='0.1 0.1 0.1'/></geometry></visual>"
+        other.write_text(
+            f"<robot name='o'><link name='a'>{box}</link><link name='b'>{box}</link><joint name='j' type='revolute'>"
+            "<parent link='a'/><child link='b'/><axis xyz='0 0 1'/><limit lower='-1' upper='1'"
+            " effort='1' velocity='1'/>"
+            "</joint></robot>"
+        )
+        bodies = (body_plan(PEPPER, "robot", appearance=other),)
+        with pytest.raises(TeleoperationError, match="no movable joint 'LShoulderPitch'"):
             PageProcess(plan(bodies=bodies), Looks()).open()
 
     def test_no_urdf_is_one_clear_error(self, tmp_path: Path) -> None:
