@@ -65,8 +65,9 @@ class _Page:
         middle, height = plan.middle, plan.height
 
         camera = server.initial_camera
-        camera.position = (1.3 * height + 0.8, middle - 0.25, floor + 0.8 * height)
-        camera.look_at = (0.0, middle - 0.25, floor + 0.5 * height)
+        # The bodies stand to the left of the picture, for the panel covers its right side.
+        camera.position = (1.0 * height + 0.9, middle + 0.5, floor + 0.75 * height)
+        camera.look_at = (0.0, middle + 0.5, floor + 0.5 * height)
 
     def show(self, message: dict[str, Any]) -> None:
         """Shows what a message holds."""
@@ -106,9 +107,9 @@ def _light(scene: Any) -> None:
     scene.set_background_image(np.broadcast_to(sky, (64, 8, 3)).astype(np.uint8))
     scene.configure_environment_map(None)
     scene.configure_default_lights(False)
-    # three.js counts light in another unit than a fraction of the colour.
-    scene.add_light_ambient("/light/ambient", intensity=np.pi * LIGHT_AMBIENT)
-    scene.add_light_directional("/light/sun", intensity=np.pi * LIGHT_DIFFUSE, position=LIGHT_FROM)
+    # three.js counts light in another unit than a fraction of the colour, and its materials swallow some.
+    scene.add_light_ambient("/light/ambient", intensity=1.3 * np.pi * LIGHT_AMBIENT)
+    scene.add_light_directional("/light/sun", intensity=1.3 * np.pi * LIGHT_DIFFUSE, position=LIGHT_FROM)
 
 
 class _Plot:
