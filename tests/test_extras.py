@@ -32,6 +32,16 @@ FEATURES = {
         "import syda_gym; from syda_gym.teleoperation.incoming.sources import WebSocketSource;"
         "WebSocketSource(syda_gym.embodiment('adult')).start()",
     ),
+    "camera": (
+        "mediapipe",
+        "from syda_gym.motions.film.pose_model import PoseModel; open('a.task', 'w').write('model');"
+        "PoseModel('a.task')",
+    ),
+    "view": (
+        "viser",
+        "from syda_gym.simulation.page.plan import PagePlan; from syda_gym.simulation.page.process import PageProcess;"
+        "PageProcess(PagePlan('title'), dict).open()",
+    ),
     "naoqi": (
         "qi",
         "import syda_gym; from syda_gym.teleoperation.outgoing.naoqi import NaoqiSink;"

@@ -24,7 +24,9 @@ from syda_gym.agents.rollout import EpisodeResult, evaluate, mean_of
 from syda_gym.agents.streams.ground import Ground
 from syda_gym.agents.streams.streams import score_streams
 from syda_gym.embodiments.catalog import resolve
+from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
+from syda_gym.embodiments.robot import Robot
 from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.envs.teleop import SydaTeleopEnv
 from syda_gym.errors import AgentError, nearest_name
@@ -34,11 +36,13 @@ from syda_gym.mappings.mapping import Mapping as MotionMapping
 from syda_gym.mappings.storage import save_mapping
 
 __all__ = [
+    "PlayedEpisode",
     "TrainingReport",
     "compare_agents",
     "export_bundle",
     "film",
     "find_agent",
+    "play_episode",
     "shipped_agents",
     "train_agent",
     "tune_rivals",
@@ -229,6 +233,64 @@ def compare_agents(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class PlayedEpisode:
+    """One episode as it went.
+
+    Attributes:
+        robot: who followed.
+        operator: who led.
+        q: the robot's joint angles ``(N, n)`` [rad].
+        reference: where it should have been ``(N, n)`` [rad].
+        frames: the operator's ``(N, F)``.
+        fps: control steps per second.
+        figures: how good it was.
+    """
+
+    robot: Robot
+    operator: Embodiment
+    q: FloatArray
+    reference: FloatArray
+    frames: FloatArray
+    fps: float
+    figures: Figures
+
+
+def play_episode(
+    options: TeleopOptions | Mapping[str, Any], agent: str | os.PathLike[str], *, clip: int | str = 0, seed: int = 0
+) -> PlayedEpisode:
+    """Plays one episode.
+
+    Args:
+        options: of the environment.
+        agent: see ``find_agent``.
+        clip: index or name.
+        seed: of disturbances.
+    """
+    from syda_gym.agents.figures import episode_figures
+
+    given = options if isinstance(options, TeleopOptions) else TeleopOptions(**options)
+    env = SydaTeleopEnv(options=TeleopOptions.of(given, {"action_mode": "position"}))
+    acting = find_agent(agent, env)
+    operator = env.layout["operator"]
+    try:
+        observation, _ = env.reset(seed=seed, options={"motion": clip})
+        acting.reset(1, seed)
+        rows: list[tuple[Any, ...]] = []
+        done = False
+        while not done:
+            seen = np.asarray(observation[operator], dtype=np.float64)
+            action = env.action_from_command(acting.act(observation[None])[0])
+            observation, _, terminated, truncated, info = env.step(np.asarray(action, dtype=np.float32))
+            rows.append((info["q"], info["reference"], info["contacts"], seen))
+            done = terminated or truncated
+    finally:
+        env.close()
+    q, reference, contacts, frames = (np.array(column) for column in zip(*rows, strict=True))
+    figures = episode_figures(env.robot, q, reference, contacts)
+    return PlayedEpisode(env.robot, resolve(given.operator), q, reference, frames, float(env.control_hz), figures)
+
+
 def film(
     options: TeleopOptions | Mapping[str, Any],
     agent: str | os.PathLike[str],
@@ -254,25 +316,9 @@ def film(
     from syda_gym.simulation.pictures.camera import Camera
     from syda_gym.simulation.pictures.video import write_video
 
-    given = options if isinstance(options, TeleopOptions) else TeleopOptions(**options)
-    env = SydaTeleopEnv(options=TeleopOptions.of(given, {"action_mode": "position"}))
-    acting = find_agent(agent, env)
-    operator = env.layout["operator"]
-    try:
-        observation, _ = env.reset(seed=seed, options={"motion": clip})
-        acting.reset(1, seed)
-        rows: list[tuple[Any, ...]] = []
-        done = False
-        while not done:
-            seen = np.asarray(observation[operator], dtype=np.float64)
-            action = env.action_from_command(acting.act(observation[None])[0])
-            observation, _, terminated, truncated, info = env.step(np.asarray(action, dtype=np.float32))
-            rows.append((info["q"], info["reference"], info["contacts"], seen))
-            done = terminated or truncated
-    finally:
-        env.close()
-    q, reference, contacts, frames = (np.array(column) for column in zip(*rows, strict=True))
-    with Camera(env.robot, resolve(given.operator)) as camera:
+    played = play_episode(options, agent, clip=clip, seed=seed)
+    q, reference, frames = played.q, played.reference, played.frames
+    with Camera(played.robot, played.operator) as camera:
 
         def pictures() -> Any:
             for index in range(len(q)):
@@ -280,10 +326,8 @@ def film(
                     progress((index + 1) / len(q))
                 yield camera.picture(q[index], reference=reference[index], operator=frames[index])
 
-        write_video(path, pictures(), fps=env.control_hz)
-    from syda_gym.agents.figures import episode_figures
-
-    return episode_figures(env.robot, q, reference, contacts)
+        write_video(path, pictures(), fps=played.fps)
+    return played.figures
 
 
 def export_bundle(

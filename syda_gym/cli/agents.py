@@ -15,6 +15,8 @@ from syda_gym.cli import checks
 from syda_gym.cli.names import ALGORITHMS, CONFIGS, KINDS, PHYSICS, REFERENCES, ticked
 from syda_gym.cli.options import (
     AGENT_HELP,
+    DEFAULT_VIEW,
+    AppearanceOption,
     DisturbancesOption,
     HeldOutOption,
     JsonOption,
@@ -27,6 +29,8 @@ from syda_gym.cli.options import (
     RobotOption,
     RouteOption,
     SeedOption,
+    ViewAddressOption,
+    ViewOption,
     ends_of,
     mapping_of,
     route_of,
@@ -232,6 +236,9 @@ def play(
     clip: Annotated[str, typer.Option(help="Name or number of the clip.")] = "0",
     physics_hz: PhysicsHzOption = 240.0,
     seed: SeedOption = 0,
+    view: ViewOption = False,
+    view_address: ViewAddressOption = DEFAULT_VIEW,
+    appearance: AppearanceOption = None,
     *,
     scene: Scene,
 ) -> None:
@@ -239,6 +246,16 @@ def play(
     from syda_gym.agents.work import film
 
     options = scene.options() | {"physics_hz": physics_hz}
+    if view:
+        from syda_gym.agents.work import play_episode
+        from syda_gym.cli.viewing import view_episode
+
+        with bar("Playing") as tell:
+            played = play_episode(options, agent, clip=int(clip) if clip.isdigit() else clip, seed=seed)
+            tell(1.0)
+        _print_figures({agent: played.figures}, f"Clip {clip}")
+        view_episode(played, f"{agent}, clip {clip}", view_address, appearance)
+        return
     with interruptible("no film was written; run the command again"), bar("Filming") as tell:
         figures = film(options, agent, out, clip=int(clip) if clip.isdigit() else clip, seed=seed, progress=tell)
     _print_figures({agent: figures}, f"Clip {clip}")

@@ -9,11 +9,14 @@ import typer
 
 from syda_gym.cli import checks
 from syda_gym.cli.options import (
+    DEFAULT_VIEW,
     ActionOption,
+    AppearanceOption,
     AxesOption,
     CalibrationOption,
     MappingOption,
     MethodOption,
+    ModelOption,
     MotionsOption,
     OperatorOption,
     OutFolderOption,
@@ -25,6 +28,8 @@ from syda_gym.cli.options import (
     SinkOption,
     SourceOption,
     TokenOption,
+    ViewAddressOption,
+    ViewOption,
     ends_of,
     mapping_of,
     route_of,
@@ -35,6 +40,7 @@ from syda_gym.cli.spellings import Program
 if TYPE_CHECKING:
     from syda_gym.embodiments.robot import Robot
     from syda_gym.teleoperation.session import Session
+    from syda_gym.teleoperation.view.cockpit import Cockpit
 
 __all__ = ["record", "robot_app", "teleop"]
 
@@ -50,6 +56,9 @@ def _robot_add(
     torso: Annotated[str | None, typer.Option(help="Link in whose frame landmarks are expressed.")] = None,
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite a robot that was added before.")] = False,
     suggest: Annotated[bool, typer.Option(help="Also say which pair to record next.")] = True,
+    view: ViewOption = False,
+    view_address: ViewAddressOption = DEFAULT_VIEW,
+    appearance: AppearanceOption = None,
 ) -> None:
     """Find arms, hands and torso of a URDF, propose landmarks and a rest pose, and make it known by name."""
     import math
@@ -80,6 +89,10 @@ def _robot_add(
         pairs = [choice.pair for choice in rank(bodies, known, samples=2**16) if people & set(choice.pair)]
         best = next(pair for pair in pairs if added.robot.name in pair)
         say.print(f"record next: {best[0]} with {best[1]} (of the pairs with a person it connects most)")
+    if view:
+        from syda_gym.cli.viewing import view_robot
+
+        view_robot(added.robot, view_address, appearance)
 
 
 @robot_app.command("show")
@@ -173,6 +186,10 @@ def teleop(
         typer.Option(help="End after this time [s].", callback=checks.between(0.0, 1e9, "s", open_low=True)),
     ] = None,
     seed: SeedOption = 0,
+    view: ViewOption = False,
+    view_address: ViewAddressOption = DEFAULT_VIEW,
+    appearance: AppearanceOption = None,
+    model: ModelOption = None,
 ) -> None:
     """Drive a robot live: calibrate, map, filter, keep to limits and speeds, avoid self-collision, send."""
     from syda_gym.routes.choice import choose_mapping
@@ -205,17 +222,19 @@ def teleop(
         rate=rate, calibration=calibration, axes=axes, speed=limit, bound_slow=bound_slow, bound_hold=bound_hold
     )
     _end_gently()
-    with _Screen() as screen:
+    secret = read_token(token_file)
+    with _Screen(view_address if view else "", secret, appearance) as screen:
         stats = teleoperate(
             chosen,
             source,
             sink or ["bullet"],
             settings=settings,
-            token=read_token(token_file),
+            token=secret,
             speed=speed,
             actions=action or (),
             repeat=repeat,
             origins=tuple(origin or ()),
+            model=model,
             journal=journal,
             note={"mapping": stored_or_method, "motions": motions, "route": route, "source": source},
             seconds=seconds,
@@ -227,6 +246,7 @@ def teleop(
         f"{summary['commands']} commands for {summary['frames']} frames; latency median "
         f"{summary['latency_p50_ms']:.2f} ms, 99 % {summary['latency_p99_ms']:.2f} ms; states {summary['states']}"
     )
+    screen.say_more(say)
     if journal is not None:
         say_written("journal", journal)
 
@@ -279,12 +299,20 @@ def record(
 
 
 class _Screen:
-    """The live table and the keyboard of ``teleop``."""
+    """The live table, the keyboard and the page of ``teleop``.
 
-    def __init__(self) -> None:
+    Args:
+        page: address of the page; empty for none.
+        token: that opens it; a new one if not given.
+        appearance: another URDF to show there.
+    """
+
+    def __init__(self, page: str, token: str | None, appearance: Path | None) -> None:
         from contextlib import ExitStack
 
         self._stack = ExitStack()
+        self._page, self._token, self._appearance = page, token, appearance
+        self._cockpit: Cockpit | None = None
         self._session: Session | None = None
         self._live: Any = None
         self._next = 0.0
@@ -295,12 +323,37 @@ class _Screen:
         from syda_gym.teleoperation.screen import keyboard, status_table
 
         self._session = session
+        if self._page:
+            self._cockpit = self._stack.enter_context(self._open_page(session))
+            console().print(f"view: {self._cockpit.address}", markup=False, highlight=False, soft_wrap=True)
         self._stack.enter_context(keyboard(session.source.inbox))
         table = status_table(session.loop, session.source, session.statistics)
         self._live = self._stack.enter_context(Live(table, console=console(stderr=True), auto_refresh=False))
 
+    def _open_page(self, session: Session) -> Cockpit:
+        from syda_gym.teleoperation.addresses import host_and_port
+        from syda_gym.teleoperation.view.cockpit import Cockpit
+
+        host, port = host_and_port(self._page, 8099)
+        return Cockpit(
+            session.loop, session.source, session.sink, session.statistics, host=host, port=port, token=self._token,
+            appearance=self._appearance,
+        )  # fmt: skip
+
+    def say_more(self, say: Any) -> None:
+        """After the run: where the time of a picture went, and what was recorded."""
+        from syda_gym.teleoperation.incoming.camera import PictureSource
+        from syda_gym.teleoperation.view.words import latency_words
+
+        if self._session is not None and isinstance(self._session.source, PictureSource):
+            say.print(latency_words(self._session.source, self._session.statistics), markup=False)
+        if self._cockpit is not None and self._cockpit.recorder.message:
+            say.print(self._cockpit.recorder.message, markup=False, soft_wrap=True)
+
     def update(self, decision: Any) -> None:
         """Twice a second; drawing takes longer than deciding."""
+        if self._cockpit is not None:
+            self._cockpit.update(decision)
         if self._session is None or decision.now < self._next:
             return
         from syda_gym.teleoperation.screen import status_table

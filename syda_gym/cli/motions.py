@@ -8,7 +8,16 @@ from typing import Annotated
 import typer
 
 from syda_gym.cli import checks
-from syda_gym.cli.options import FpsOption, JsonOption, OutFolderOption, PictureOption, SpecArgument
+from syda_gym.cli.options import (
+    DEFAULT_VIEW,
+    FpsOption,
+    JsonOption,
+    OutFolderOption,
+    PictureOption,
+    SpecArgument,
+    ViewAddressOption,
+    ViewOption,
+)
 from syda_gym.cli.shared import console, print_json, say_written, show_table
 from syda_gym.cli.spellings import Program
 
@@ -22,6 +31,8 @@ def _motions_info(
     spec: SpecArgument,
     picture: PictureOption = None,
     as_json: JsonOption = False,
+    view: ViewOption = False,
+    view_address: ViewAddressOption = DEFAULT_VIEW,
 ) -> None:
     """Say what a recording holds: bodies, actions, rate, gaps, and the units and axes that were found."""
     import warnings
@@ -61,6 +72,14 @@ def _motions_info(
         say.print(f"- {note}", markup=False)
     if picture is not None:
         say_written("picture", picture)
+    if view:
+        from syda_gym.cli.viewing import view_motions
+        from syda_gym.motions import load_motions
+
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MotionWarning)
+            motions = load_motions(spec)
+        view_motions(motions, view_address)
 
 
 @motions_app.command("check")

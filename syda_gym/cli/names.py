@@ -31,7 +31,7 @@ __all__ = [
 BODIES = ("adult", "kid", "pepper", "nao", "child", "left_only", "long_arms", "stiff", "tall")
 """Bodies of the catalog; robots that the user added come to them."""
 
-FORMATS = ("paper", "pairs", "npz", "bvh", "kinect", "openni", "mediapipe")
+FORMATS = ("paper", "pairs", "npz", "bvh", "kinect", "openni", "mediapipe", "film")
 """Prefixes of ``format:PATH``; see ``syda-gym motions formats``."""
 
 METHODS: dict[str, tuple[str, ...]] = {
@@ -99,7 +99,7 @@ REFERENCES = ("paired", "mapped")
 AXES = ("kinect", "ros", "camera")
 """Axes of a live source."""
 
-SOURCES = ("replay:SPEC", "udp:PORT", "udp:HOST:PORT", "ws:PORT")
+SOURCES = ("camera[:N]", "film:FILE.mp4", "replay:SPEC", "udp:PORT", "udp:HOST:PORT", "ws:PORT")
 """How live sources are written."""
 
 SINKS = ("bullet", "window", "video:FILE.mp4", "udp:HOST:PORT", "naoqi:URL", "none")

@@ -28,8 +28,10 @@ from syda_gym.errors import nearest_name
 
 __all__ = [
     "AGENT_HELP",
+    "DEFAULT_VIEW",
     "ActionOption",
     "AgentOption",
+    "AppearanceOption",
     "AxesOption",
     "BodiesArgument",
     "CalibrationOption",
@@ -43,6 +45,7 @@ __all__ = [
     "MaxHopsOption",
     "MethodOption",
     "MethodsOption",
+    "ModelOption",
     "MotionsOption",
     "OperatorOption",
     "OutFolderOption",
@@ -57,6 +60,8 @@ __all__ = [
     "SourceOption",
     "SpecArgument",
     "TokenOption",
+    "ViewAddressOption",
+    "ViewOption",
     "WorkersOption",
     "ends_of",
     "mapping_of",
@@ -207,6 +212,19 @@ CalibrationOption = Annotated[
 ]
 TokenOption = Annotated[
     Path | None, typer.Option("--token-file", help="File with the secret that packets carry beyond this machine.")
+]
+
+DEFAULT_VIEW = "127.0.0.1:8099"
+ViewOption = Annotated[bool, typer.Option("--view", help="Show it live on a page in the browser (extra `view`).")]
+ViewAddressOption = Annotated[
+    str, typer.Option("--view-address", help="Where the page listens; port 0 takes any that is free.")
+]
+AppearanceOption = Annotated[
+    Path | None,
+    typer.Option("--appearance", help="Another URDF of the robot to show on the page, say the vendor's with meshes."),
+]
+ModelOption = Annotated[
+    Path | None, typer.Option("--model", help="Pose model of cameras and films, a `.task` file (extra `camera`).")
 ]
 
 

@@ -17,6 +17,7 @@ from syda_gym.errors import MotionError, OptionError, nearest_name
 from syda_gym.files import asset
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.dataset import is_dataset, read_dataset
+from syda_gym.motions.film.reader import ENDINGS, is_film, read_film
 from syda_gym.motions.readers.bvh import is_bvh, read_bvh
 from syda_gym.motions.readers.kinect import is_kinect, read_kinect
 from syda_gym.motions.readers.mediapipe import is_mediapipe, read_mediapipe
@@ -138,6 +139,7 @@ FORMATS: dict[str, Format] = {
         Format("bvh", "motion capture, joints found by name", (".bvh",), read_bvh, is_bvh),
         Format("kinect", "Kinect v2: timestamp and 25 joints a line", (".csv",), read_kinect, is_kinect),
         Format("openni", "OpenNI / Kinect v1: 15 joints a line", (".txt", ".skeleton"), read_openni, is_openni),
+        Format("film", "a film of one person, by MediaPipe's pose model (extra camera)", ENDINGS, read_film, is_film),
         Format("mediapipe", "world landmarks as JSON, CSV or npz", (".json", ".jsonl"), read_mediapipe, is_mediapipe),
     )
 }

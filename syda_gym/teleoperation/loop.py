@@ -93,6 +93,17 @@ class TeleoperationLoop:
         return self._command.copy()
 
     @property
+    def target(self) -> FloatArray:
+        """Where the mapping, or the way home, asks the robot to be ``(n,)`` [rad]; for whoever shows it."""
+        return self._target
+
+    @property
+    def frame(self) -> FloatArray | None:
+        """The operator's last frame ``(F,)`` in the mapping's unit and axes, or ``None``; for whoever shows it."""
+        frame, calibration = self._frame, self.calibration
+        return None if frame is None or calibration is None else calibration.apply(frame)
+
+    @property
     def calibration_message(self) -> str:
         """Why the operator is not calibrated yet; empty if nothing was refused."""
         return self._calibrator.message

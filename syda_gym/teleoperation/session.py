@@ -17,7 +17,7 @@ from syda_gym.teleoperation.journal import Journal
 from syda_gym.teleoperation.live_run import run
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
-from syda_gym.teleoperation.outgoing.sinks import Sink
+from syda_gym.teleoperation.outgoing.sinks import ManySinks, Sink
 from syda_gym.teleoperation.tick import Decision, LoopSettings
 
 __all__ = ["Session", "teleoperate"]
@@ -44,6 +44,7 @@ def teleoperate(
     actions: Sequence[str] = (),
     repeat: bool = False,
     origins: tuple[str, ...] = (),
+    model: str | os.PathLike[str] | None = None,
     journal: str | os.PathLike[str] | None = None,
     note: dict[str, Any] | None = None,
     seconds: float | None = None,
@@ -62,6 +63,7 @@ def teleoperate(
         actions: that a replay plays.
         repeat: whether a replay begins again.
         origins: web pages that may connect to a WebSocket.
+        model: file of the pose model of cameras and films; ``None`` for the default place.
         journal: file to write every decision to.
         note: free facts for the journal.
         seconds: when to end.
@@ -82,14 +84,17 @@ def teleoperate(
         if isinstance(source, Source)
         else make_source(
             source, mapping.source, token=token, speed=speed, actions=actions, calibration=chosen.calibration,
-            repeat=repeat, origins=origins,
+            repeat=repeat, origins=origins, model=model,
         )
     )  # fmt: skip
     probe = TeleoperationLoop(mapping, chosen)
-    sink = sinks if isinstance(sinks, Sink) else make_sink(sinks, probe.robot, token=token, rate=chosen.rate)
+    sink = sinks if isinstance(sinks, Sink) else make_sink(
+        sinks, probe.robot, token=token, rate=chosen.rate, operator=mapping.source
+    )  # fmt: skip
     with sink:
         start = _where(sink)
         loop = probe if start is None else TeleoperationLoop(mapping, chosen, start)
+        _show_operator(sink, loop)
         written = None if journal is None else Journal(Path(journal), loop, note)
         stats = LiveStatistics()
         try:
@@ -102,6 +107,14 @@ def teleoperate(
         finally:
             if written is not None:
                 written.close()
+
+
+def _show_operator(sink: Sink, loop: TeleoperationLoop) -> None:
+    """Lets films and windows ask for the operator's frames."""
+    for each in sink.sinks if isinstance(sink, ManySinks) else (sink,):
+        accompany = getattr(each, "accompany", None)
+        if accompany is not None:
+            accompany(lambda: loop.frame)
 
 
 def _where(sink: Sink) -> FloatArray | None:

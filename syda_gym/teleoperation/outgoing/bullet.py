@@ -6,7 +6,7 @@ import os
 import queue
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
+from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, TeleoperationError
 from syda_gym.simulation.making import make_world
@@ -32,7 +33,7 @@ class BulletSink(Sink):
 
     Args:
         robot: who follows.
-        operator: whose body is named in the window; it is not drawn, for frames do not reach the sink.
+        operator: who leads, shown beside the robot once ``accompany`` says where to ask for frames.
         window: show PyBullet's window; needs a display.
         video: write what would be seen to this ``.mp4``.
         rate: control steps per second; physics runs at 240 Hz or the next multiple.
@@ -74,6 +75,15 @@ class BulletSink(Sink):
         self._pictures: queue.Queue[NDArray[np.uint8] | None] = queue.Queue(_PICTURES)
         self._writer: threading.Thread | None = None
         self._failure: Exception | None = None
+        self._frame: Callable[[], FloatArray | None] = lambda: None
+
+    def accompany(self, frame: Callable[[], FloatArray | None]) -> None:
+        """Shows the operator in films and in the window.
+
+        Args:
+            frame: called from the simulation's thread; the operator's newest frame ``(F,)``, or ``None``.
+        """
+        self._frame = frame
 
     def open(self) -> None:
         """Builds the world and starts to simulate.
@@ -89,11 +99,15 @@ class BulletSink(Sink):
             raise OptionError(
                 "the sink 'window' needs a display ($DISPLAY is not set); use 'bullet' or 'video:FILE.mp4'"
             )
-        view = CameraView.resolve({"operator": False, "distance": 1.6 * self.robot.height, **self.camera})
+        shown = {"operator": False, "distance": 1.6 * self.robot.height}
+        if self.operator is not None:
+            tall = max(float(getattr(body, "height", 1.0)) for body in (self.robot, self.operator))
+            shown = {"operator": True, "distance": max(3.0, 1.75 * tall)}
+        view = CameraView.resolve({**shown, **self.camera})
         if self.window:
             self._eye = Window(self.robot, self.operator or self.robot, view, float(self.rates.control_hz))
         elif self.video is not None:
-            self._eye = Camera(self.robot, None, view)
+            self._eye = Camera(self.robot, self.operator, view)
         self._world = make_world(self.robot, self.rates)
         self._ending.clear()
         if self.video is not None and not self.window:
@@ -174,10 +188,13 @@ class BulletSink(Sink):
         n = self.robot.n_features
         angles = pose[:n]
         errors = np.linalg.norm(pose[n:].reshape(-1, 3) - self.robot.landmarks(command)[0], axis=-1)
+        frame = self._frame()
+        if frame is None and isinstance(self.operator, HumanSkeleton):
+            frame = self.operator.standing()
         if self.window:
-            self._eye.show(angles, reference=command, operator=np.zeros(0), errors=errors)
+            self._eye.show(angles, reference=command, operator=frame, errors=errors)
         else:
-            picture = self._eye.picture(angles, reference=command, errors=errors)
+            picture = self._eye.picture(angles, reference=command, operator=frame, errors=errors)
             for _ in range(steps):  # so that the film lasts as long as what it shows
                 self._pictures.put(picture)
 

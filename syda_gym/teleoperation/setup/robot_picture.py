@@ -13,10 +13,11 @@ from syda_gym.embodiments.kinematics.urdf import read_urdf
 from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.embodiments.robot import Robot
 from syda_gym.files import atomic_path
+from syda_gym.look import LEFT, RIGHT
 
 __all__ = ["draw_robot"]
 
-_COLOURS = {"left": "#c44e52", "right": "#4c72b0"}
+_COLOURS = {"left": LEFT, "right": RIGHT}
 _VIEWS = (("front", 1, 2), ("from its right", 0, 2), ("from above", 1, 0))
 _POINTS = ("shoulder", "elbow", "wrist")
 
