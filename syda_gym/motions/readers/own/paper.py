@@ -15,7 +15,7 @@ from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.errors import MotionError
 from syda_gym.motions.clip import Motions, Take
-from syda_gym.motions.readers.workbook import read_sheets
+from syda_gym.motions.readers.own.workbook import read_sheets
 
 __all__ = ["DEFAULT_FPS", "read_paper"]
 

@@ -1,4 +1,4 @@
-"""Writing files so that nothing is ever half-written, and reading text with a size limit."""
+"""Writing files so that nothing is ever half-written."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from typing import Any
 
 from syda_gym.errors import StorageError
 
-__all__ = ["asset", "atomic_path", "fingerprint", "read_json", "write_bytes", "write_json", "write_text"]
+__all__ = ["asset", "atomic_path", "fingerprint", "write_bytes", "write_json", "write_text"]
 
-ASSETS = Path(__file__).parent / "assets"
+ASSETS = Path(__file__).parents[1] / "assets"
 
 
 def asset(*parts: str) -> Path:
@@ -71,23 +71,6 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> Path:
 def write_json(path: str | os.PathLike[str], value: Any) -> Path:
     """Writes JSON (sorted keys, indented) atomically and returns the path."""
     return write_text(path, json.dumps(value, indent=1, sort_keys=True) + "\n")
-
-
-def read_json(path: str | os.PathLike[str], limit: int = 64 * 2**20) -> Any:
-    """Reads a JSON file of at most ``limit`` bytes.
-
-    Raises:
-        StorageError: the file is missing, larger than ``limit``, or not JSON.
-    """
-    source = Path(path)
-    if not source.is_file():
-        raise StorageError(f"no file {source}; check the path")
-    if source.stat().st_size > limit:
-        raise StorageError(f"{source} is larger than {limit} bytes; expected a small JSON file")
-    try:
-        return json.loads(source.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise StorageError(f"{source} is not valid JSON: {error}; write it again") from error
 
 
 def fingerprint(*parts: bytes | str) -> str:
