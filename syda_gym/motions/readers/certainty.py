@@ -41,9 +41,10 @@ def without_lost(points: FloatArray, certainty: FloatArray | None, said: Said) -
 
 
 def looks_like_certainty(values: FloatArray) -> bool:
-    """Whether numbers are states or confidences: whole and small, or between 0 and 1."""
+    """Whether numbers are states or confidences: nearly all whole and small, or nearly all between 0 and 1."""
     known = values[np.isfinite(values)]
     if not len(known):
         return False
-    whole = (known == np.round(known)).all() and known.min() >= 0.0 and known.max() <= 3.0
-    return bool(whole or (known.min() >= 0.0 and known.max() <= 1.0))
+    whole = (known == np.round(known)) & (known >= 0.0) & (known <= 3.0)
+    share = (known >= 0.0) & (known <= 1.0)
+    return bool(max(whole.mean(), share.mean()) > 0.95)

@@ -24,13 +24,15 @@ CLOCKS: dict[str, str | None] = {
     "relativetime": None, "captime": None, "devicetime": None, "systemtime": None, "elapsed": None, "datetime": None,
     "date": None, "sec": "s", "secs": "s", "second": "s", "seconds": "s", "millis": "ms", "msec": "ms", "ms": "ms",
     "millisecond": "ms", "milliseconds": "ms", "us": "us", "usec": "us", "micros": "us", "microseconds": "us", "ns": "ns",
-    "nsec": "ns", "nanoseconds": "ns", "ticks": "ticks",
+    "nsec": "ns", "nanoseconds": "ns", "ticks": "ticks", "zeit": None, "temps": None,
+    "tiempo": None, "tempo": None,
 }  # fmt: skip
 """How columns of time are called, with the unit where the name says it."""
 
 _ENDINGS = {"s": "s", "sec": "s", "secs": "s", "seconds": "s", "ms": "ms", "msec": "ms", "milliseconds": "ms", "us": "us",
             "usec": "us", "microseconds": "us", "ns": "ns", "nsec": "ns", "ticks": "ticks"}  # fmt: skip
-_BEGINNINGS = {"time", "times", "timestamp", "timestamps", "t", "clock", "elapsed", "frametime", "device", "system"}
+_BEGINNINGS = {"time", "times", "timestamp", "timestamps", "t", "clock", "elapsed", "frametime", "device", "system",
+               "zeit", "temps"}  # fmt: skip
 _WORDS = {"in", "time", "timestamp", "stamp", "of", "frame", "frametime"}
 
 # Rates at which people are recorded, and how much more likely than others they are (in units of the natural logarithm).

@@ -72,6 +72,8 @@ def from_names(
     lines = grid.lines if rows is None else grid.lines[rows]
     wanted, notes = points_by_person(grid, list(places), said, list(notes))
     names = [name for name, _ in wanted]
+    if not wanted:
+        return _only_said(grid, picked, lines, said, format or "table", notes)
     points = np.stack([picked[:, [places[key][axis] for axis in "xyz"]] for _, key in wanted], axis=1)
     sure = np.stack(
         [picked[:, places[key]["c"]] if "c" in places[key] else np.full(len(picked), np.nan) for _, key in wanted], axis=1
@@ -102,6 +104,20 @@ def from_names(
         grid.path, kind, joints, lines=lines, up=(0.0, -1.0, 0.0) if kind in ("mediapipe", "azure") else (0.0, 1.0, 0.0), names=names,
         notes=notes, image=kind in ("mediapipe", "table"),
     )  # fmt: skip
+
+
+def _only_said(
+    grid: Grid, values: FloatArray, lines: NDArray[np.int64], said: Said, kind: str, notes: list[str]
+) -> Recording:
+    """Nothing but columns that somebody named."""
+    joints = _said_columns(grid, values, said)
+    unknown = [joint for joint in said.joints if joint not in joints]
+    if unknown or not joints:
+        raise MotionError(
+            f"{grid.path}: no column has the axis of a point in its name, so joints need three columns each: --joints LShoulder=X,Y,Z; "
+            f"{', '.join(unknown[:4]) or 'none'} {'has' if len(unknown) == 1 else 'have'} not"
+        )
+    return Recording(grid.path, kind, joints, lines=lines, names=[cell for cell in grid.header[-1] if cell] if grid.header else [], notes=notes)
 
 
 def points_by_person(grid: Grid, keys: Sequence[str], said: Said, notes: list[str]) -> tuple[list[tuple[str, str]], list[str]]:

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from syda_gym.embodiments import catalog
 from syda_gym.errors import EmbodimentError, MotionError
 from syda_gym.motions import Motions, Take, generate, load_motions, save_motions
-from syda_gym.motions.readers import npz
-from syda_gym.motions.readers.npz import read_npz
+from syda_gym.motions.readers.own import npz
+from syda_gym.motions.readers.own.npz import read_npz
 
 
 @pytest.fixture(scope="module")

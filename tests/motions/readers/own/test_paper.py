@@ -16,7 +16,7 @@ from syda_gym.embodiments import catalog
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MotionError
 from syda_gym.motions import Motions, load_motions
-from syda_gym.motions.readers.paper import read_paper
+from syda_gym.motions.readers.own.paper import read_paper
 from tests.motions.paper_workbooks import HEADER, human_sheets, pepper_sheets, write_dataset, write_workbook
 
 
