@@ -63,7 +63,15 @@ def open_archive(
             yield archive
     except SydaError:
         raise
-    except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, NotImplementedError, ValueError) as problem:
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        OSError,
+        EOFError,
+        RuntimeError,
+        NotImplementedError,
+        ValueError,
+    ) as problem:
         raise error(f"{file} is no readable archive: {problem}; expected {what}") from problem
 
 

@@ -12,7 +12,20 @@ from syda_gym.files.budget import BUDGET, check_size
 
 __all__ = ["check_tensors"]
 
-_WIDTHS = {"F64": 8, "F32": 4, "F16": 2, "I64": 8, "I32": 4, "I16": 2, "I8": 1, "U8": 1, "U16": 2, "U32": 4, "U64": 8, "BOOL": 1}
+_WIDTHS = {
+    "F64": 8,
+    "F32": 4,
+    "F16": 2,
+    "I64": 8,
+    "I32": 4,
+    "I16": 2,
+    "I8": 1,
+    "U8": 1,
+    "U16": 2,
+    "U32": 4,
+    "U64": 8,
+    "BOOL": 1,
+}
 _TABLE = 4 * 2**20  # bytes
 
 
@@ -52,7 +65,9 @@ def check_tensors(
         for name, entry in table.items():
             kind, shape, (first, last) = entry["dtype"], entry["shape"], entry["data_offsets"]
             if kind not in _WIDTHS:
-                raise error(f"{file}: {name[:80]!r} has numbers of type {str(kind)[:20]}; expected {', '.join(_WIDTHS)}")
+                raise error(
+                    f"{file}: {name[:80]!r} has numbers of type {str(kind)[:20]}; expected {', '.join(_WIDTHS)}"
+                )
             if not all(isinstance(side, int) and side >= 0 for side in (*shape, first, last)):
                 raise ValueError(f"{name[:80]!r} has a negative or broken size")
             if math.prod(shape) * _WIDTHS[kind] != last - first or len(shape) > 8:

@@ -21,8 +21,8 @@ def read_json(path: str | os.PathLike[str], limit: int = 64 * 2**20) -> Any:
     """Reads a JSON file of at most ``limit`` bytes.
 
     Raises:
-        StorageError: the file is missing, larger than ``limit``, or not JSON; or it holds more values than the budget of
-            readers allows, or numbers of very many digits.
+        StorageError: the file is missing, larger than ``limit``, or not JSON; or it holds more values than the budget
+            of readers allows, or numbers of very many digits.
     """
     source = Path(path)
     if not source.is_file():

@@ -63,16 +63,17 @@ def load_motions(
 ) -> Motions:
     """Loads motions.
 
-    What a recording of another tool does not say is found by looking at it: which joint is which, units, axes, the rate of
-    frames. Where that fails, the arguments say it.
+    What a recording of another tool does not say is found by looking at it: which joint is which, units, axes, the
+    rate of frames. Where that fails, the arguments say it.
 
     Args:
         spec: ``"embedded"`` (synthetic, shipped), ``"format:PATH"`` such as ``"paper:DIR"``, a path whose format is
             found by looking into it, or motions, which are returned as they are.
-        fps: frames per second. Recordings without timestamps (the paper's), or with times that cannot be right, are taken
-            to have this rate; all others are resampled to it. By default the recording's own rate, 10 Hz for the paper's.
-        joints: joint (``LShoulder``, ``LElbow``, ``LHand``, ``Head``, ...) to its name in the file, to the number of its
-            point from 0, or to its three columns ``"x,y,z"`` by name or number.
+        fps: frames per second. Recordings without timestamps (the paper's), or with times that cannot be right, are
+            taken to have this rate; all others are resampled to it. By default the recording's own rate, 10 Hz for the
+            paper's.
+        joints: joint (``LShoulder``, ``LElbow``, ``LHand``, ``Head``, ...) to its name in the file, to the number of
+            its point from 0, or to its three columns ``"x,y,z"`` by name or number.
         unit: unit of length of the file: ``m``, ``cm``, ``mm``, ``in``, ``ft``, or metres per unit.
         up: axis of the file that points up, such as ``"z"`` or ``"-y"``.
         person: which of several people, from 1; by default the first, and a note says that there are others.
@@ -99,7 +100,9 @@ def load_motions(
     if chosen.name == "paper" and fps is not None and not speaks:
         return read_paper(path, fps)
     if speaks and not chosen.listens:
-        raise OptionError(f"{path} is of the format {chosen.name!r}, which says joints, units and axes itself; leave them out")
+        raise OptionError(
+            f"{path} is of the format {chosen.name!r}, which says joints, units and axes itself; leave them out"
+        )
     motions = chosen.read(path, said) if chosen.listens else chosen.read(path)
     rate = fps if fps is not None else said.fps
     return motions if rate is None else resampled(motions, rate)
@@ -160,13 +163,16 @@ FORMATS: dict[str, Format] = {
         Format("npz", "a file written by save_motions", (".npz",), read_npz, _is_npz),
         Format("bvh", "motion capture as a tree of joints", (".bvh",), read_bvh, is_bvh, True),
         Format("c3d", "motion capture as markers (extra c3d)", (".c3d",), read_c3d, is_c3d, True),
-        Format("bag", "ROS 1 and 2 bags, MCAP: tf or markers (extra ros)", (".bag", ".mcap", ".db3"), read_bag, is_bag, True),
+        Format("bag", "ROS 1 and 2 bags, MCAP: tf or markers (extra ros)", (".bag", ".mcap", ".db3"), read_bag,
+        is_bag, True),
         Format("kinect", "Kinect v1 and v2: 20 or 25 joints a line", (), read_kinect, _never, True),
         Format("azure", "Azure Kinect: 32 joints, JSON or table", (), read_azure, _never, True),
         Format("openni", "OpenNI, NiTE, Cornell: 15 joints a line", (), read_openni, _never, True),
         Format("mediapipe", "33 world landmarks: JSON, tables, npy, npz", (), read_mediapipe, _never, True),
-        Format("keypoints", "points of other trackers: JSON, npy, npz", (".json", ".jsonl", ".npy"), read_keypoints, _is_points, True),
-        Format("table", "any text: TRC, OptiTrack, Vicon, NTU, named columns", (".csv", ".tsv", ".txt", ".trc", ".skeleton"), read_table,
+        Format("keypoints", "points of other trackers: JSON, npy, npz", (".json", ".jsonl", ".npy"), read_keypoints,
+        _is_points, True),
+        Format("table", "any text: TRC, OptiTrack, Vicon, NTU, named columns", (".csv", ".tsv", ".txt", ".trc",
+        ".skeleton"), read_table,
                is_table, True),
     )
 }  # fmt: skip

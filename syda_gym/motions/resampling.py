@@ -37,7 +37,9 @@ def _resampled(take: Take, fps: float) -> Take:
     count = len(next(iter(take.frames.values())))
     times = np.arange(count) / take.fps if take.timestamps is None else take.timestamps - take.timestamps[0]
     if not times[-1] * fps < _MOST_FRAMES:
-        raise MotionError(f"{take.recording}: {times[-1]:.3g} s at {fps:g} frames per second are more than {_MOST_FRAMES} frames")
+        raise MotionError(
+            f"{take.recording}: {times[-1]:.3g} s at {fps:g} frames per second are more than {_MOST_FRAMES} frames"
+        )
     # A small tolerance keeps the last frame when its time is a multiple of the new period up to rounding.
     wanted = np.arange(int(np.floor(times[-1] * fps + 1e-6)) + 1) / fps
     after = np.clip(np.searchsorted(times, wanted - 1e-9), 1, max(1, count - 1))

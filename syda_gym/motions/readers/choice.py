@@ -93,7 +93,8 @@ def best_way(path: Path, ways: Sequence[Way], found: str) -> tuple[Way, str | No
     """
     if not ways:
         raise MotionError(
-            f"{path}: {found}, which is no order of joints that is known. Say which is which: --joints LShoulder=0 (number of "
+            f"{path}: {found}, which is no order of joints that is known. Say which is which: --joints LShoulder=0 "
+            f"(number of "
             "the point, from 0), or a layout in YAML"
         )
     judged = []
@@ -105,21 +106,27 @@ def best_way(path: Path, ways: Sequence[Way], found: str) -> tuple[Way, str | No
     weight, best, findings = judged[0]
     if len(ways) > 1 and weight > _WORST:
         lines = "; ".join(
-            f"as {way.label}: {', '.join(f.text for f in odd[:2]) or 'no complete arm'}" for _, way, odd in judged[:_SHOWN]
+            f"as {way.label}: {', '.join(f.text for f in odd[:2]) or 'no complete arm'}"
+            for _, way, odd in judged[:_SHOWN]
         )
         raise MotionError(
-            f"{path}: {found}, which make no person: {lines}. Say which is which: --joints LShoulder=0 (number of the point, "
+            f"{path}: {found}, which make no person: {lines}. Say which is which: --joints LShoulder=0 (number of "
+            f"the point, "
             "from 0), or a layout in YAML"
         )
     for other, way, _ in judged[1:]:
         if other < weight + _CLEAR and other <= _WORST and not _same_arms(best, way):
-            return best, f"read as {best.label}, though {way.label} makes a person as well; --joints says which is right"
+            return (
+                best,
+                f"read as {best.label}, though {way.label} makes a person as well; --joints says which is right",
+            )
     return best, None
 
 
 def _arm(way: Way, side: str) -> bool:
     return all(
-        side + part in way.joints and np.isfinite(way.joints[side + part]).all(axis=1).any() for part in ("Shoulder", "Elbow", "Hand")
+        side + part in way.joints and np.isfinite(way.joints[side + part]).all(axis=1).any()
+        for part in ("Shoulder", "Elbow", "Hand")
     )
 
 

@@ -73,11 +73,14 @@ def frame_rate(recording: Recording, clock: Clock, said: Said) -> float:
     fps = float((len(times) - 1) / (times[-1] - times[0]))
     if not _SLOWEST <= fps <= _FASTEST:
         raise MotionError(
-            f"{recording.path}: {fps:.3g} frames per second by its times; expected {_SLOWEST} to {_FASTEST:g}. Say the rate: --fps"
+            f"{recording.path}: {fps:.3g} frames per second by its times; expected {_SLOWEST} to {_FASTEST:g}. Say "
+            f"the rate: --fps"
         )
     longest = float(np.diff(times).max())
     if longest > 3.0 / fps:
-        recording.notes.append(f"frames are missing: the longest step is {longest:.3f} s at {fps:.1f} frames per second")
+        recording.notes.append(
+            f"frames are missing: the longest step is {longest:.3f} s at {fps:.1f} frames per second"
+        )
     return fps
 
 
@@ -97,7 +100,8 @@ def _stamped(recording: Recording, times: FloatArray) -> Clock:
     if (steps < 0).any():
         frame = int(np.flatnonzero(steps < 0)[0]) + 1
         raise MotionError(
-            f"{recording.path}, {recording.where(frame)}: time runs backward, {times[frame - 1]:g} s to {times[frame]:g} s; if "
+            f"{recording.path}, {recording.where(frame)}: time runs backward, {times[frame - 1]:g} s to "
+            f"{times[frame]:g} s; if "
             "several recordings follow one another in the file, cut it"
         )
     if not (steps > 0).any():
@@ -106,7 +110,8 @@ def _stamped(recording: Recording, times: FloatArray) -> Clock:
     if repeats.mean() > _COARSE and not _same_frames(recording, repeats):
         spread = _spread(times)
         recording.doubt(
-            f"times are coarser than frames: {len(times)} frames share {len(np.unique(times))} timestamps; spread evenly between "
+            f"times are coarser than frames: {len(times)} frames share {len(np.unique(times))} timestamps; spread "
+            f"evenly between "
             "them"
         )
         return Clock(spread, np.arange(len(times)), True)
@@ -134,7 +139,10 @@ def _spread(times: FloatArray) -> FloatArray:
     step = float((stamps[-1] - stamps[0]) / max(1, first[-1]))
     ends = np.r_[stamps[1:], stamps[-1] + counts[-1] * step]
     return np.concatenate(
-        [start + (end - start) * np.arange(count) / count for start, end, count in zip(stamps, ends, counts, strict=True)]
+        [
+            start + (end - start) * np.arange(count) / count
+            for start, end, count in zip(stamps, ends, counts, strict=True)
+        ]
     )
 
 

@@ -16,25 +16,30 @@ __all__ = ["JOINTS", "match_indices", "match_joints", "missing_hint", "side_and_
 # (Kinect, MediaPipe, OpenNI) our shoulder is its "shoulder".
 _SIDED: dict[str, tuple[str, ...]] = {
     "Shoulder": (
-        "arm", "upperarm", "uparm", "uarm", "armupper", "armup", "humerus", "shldrbend", "upperarmbend", "shoulderjoint",
+        "arm", "upperarm", "uparm", "uarm", "armupper", "armup", "humerus", "shldrbend", "upperarmbend",
+        "shoulderjoint",
         "shoulder", "shldr", "bicep", "biceps", "oberarm", "sho",
     ),
     "Elbow": (
-        "forearm", "lowerarm", "lowarm", "loarm", "farm", "armlower", "armlow", "armfore", "forearmbend", "lowerarmbend", "forarm",
+        "forearm", "lowerarm", "lowarm", "loarm", "farm", "armlower", "armlow", "armfore", "forearmbend",
+        "lowerarmbend", "forarm",
         "elbow", "elbowjoint", "radius", "ulna", "unterarm", "elb",
     ),
     "Hand": ("wrist", "hand", "palm", "wri", "handjoint", "wristjoint"),
     "Hip": ("upleg", "upperleg", "uleg", "legupper", "thigh", "thighbend", "femur", "hip", "hipjoint", "oberschenkel"),
-    "Knee": ("leg", "lowerleg", "loleg", "lowleg", "lleg", "leglower", "shin", "shinbend", "calf", "tibia", "knee", "unterschenkel",
+    "Knee": ("leg", "lowerleg", "loleg", "lowleg", "lleg", "leglower", "shin", "shinbend", "calf", "tibia", "knee",
+    "unterschenkel",
              "kne"),
     "Foot": ("ankle", "foot", "ank", "fuss"),
     "Toe": ("toebase", "toe", "footindex", "ball", "toes", "bigtoe", "foottip", "foottoe"),
 }  # fmt: skip
 _CENTRAL: dict[str, tuple[str, ...]] = {
     "Head": ("head", "skull", "kopf", "nose"),
-    "Neck": ("neck", "shouldercenter", "shouldercentre", "spineshoulder", "neck1", "necklower", "lowerneck", "thorax", "hals"),
+    "Neck": ("neck", "shouldercenter", "shouldercentre", "spineshoulder", "neck1", "necklower", "lowerneck", "thorax",
+    "hals"),
     "Torso": (
-        "torso", "spinemid", "spinenavel", "spinemiddle", "spine1", "spine", "spinechest", "chest", "abdomen", "ab", "abdomenlower",
+        "torso", "spinemid", "spinenavel", "spinemiddle", "spine1", "spine", "spinechest", "chest", "abdomen", "ab",
+        "abdomenlower",
         "waist", "belly", "trunk",
     ),
     "Pelvis": ("hips", "pelvis", "hip", "hipcenter", "hipcentre", "spinebase", "root", "midhip", "lowerback", "becken"),
@@ -49,8 +54,10 @@ _WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z][a-z]*|[a-z]+|\d+|[^\W\d_A-Za-z]+")
 _SIDES = {"left": "L", "right": "R", "l": "L", "r": "R", "lft": "L", "rgt": "R", "lt": "L", "rt": "R", "links": "L",
           "rechts": "R"}  # fmt: skip
 _NOISE = {
-    "mixamorig", "mixamo", "character", "skel", "skeleton", "bip", "biped", "valvebiped", "bone", "def", "org", "mch", "joint",
-    "jnt", "j", "bnd", "ccbase", "cc", "base", "m", "b", "c", "ctrl", "tracker", "body", "part", "marker", "pose", "landmark",
+    "mixamorig", "mixamo", "character", "skel", "skeleton", "bip", "biped", "valvebiped", "bone", "def", "org", "mch",
+    "joint",
+    "jnt", "j", "bnd", "ccbase", "cc", "base", "m", "b", "c", "ctrl", "tracker", "body", "part", "marker", "pose",
+    "landmark",
     "landmarks", "k4abt", "kinect", "xsens", "keypoint",
 }  # fmt: skip
 # MikuMikuDance writes its bones in Japanese; longer words stand first.
@@ -117,7 +124,8 @@ def missing_hint(joint: str, names: Iterable[str]) -> str:
     synonyms = ", ".join(side + part.capitalize() for part in _SIDED[joint[1:]][:14])
     shown = [name[:40] for name in itertools.islice(names, 80)]
     return (
-        f"it may be called {synonyms} (or with L_, _l, .L and the like); {nearest_name(side + joint[1:], shown)}. Say it "
+        f"it may be called {synonyms} (or with L_, _l, .L and the like); {nearest_name(side + joint[1:], shown)}. "
+        f"Say it "
         f"with --joints {joint}=NAME"
     )
 
@@ -127,7 +135,9 @@ def side_and_rest(name: str) -> tuple[str, str]:
     return _keys(_words(name))[0]
 
 
-def _chain(side: str, keyed: dict[tuple[str, str], int], parents: Sequence[int], found: dict[str, int]) -> dict[str, int]:
+def _chain(
+    side: str, keyed: dict[tuple[str, str], int], parents: Sequence[int], found: dict[str, int]
+) -> dict[str, int]:
     """Shoulder, elbow and hand that hang below one another, the best names first."""
     choices = [[keyed[side, part] for part in _SIDED[joint] if (side, part) in keyed] for joint in _ARM]
     first = [found.get(side + joint) for joint in _ARM]
@@ -165,7 +175,8 @@ def _without_shared(rows: list[list[str]]) -> list[list[str]]:
             if count < max(3, _SHARED * sum(bool(row) for row in rows)) or word in _SIDES or (last and word.isdigit()):
                 break
             rows = [
-                (row[:-1] if last else row[1:]) if len(row) > 1 and row[-1 if last else 0] == word else row for row in rows
+                (row[:-1] if last else row[1:]) if len(row) > 1 and row[-1 if last else 0] == word else row
+                for row in rows
             ]
     return rows
 
@@ -197,7 +208,7 @@ def _without_noise(words: list[str]) -> list[str]:
     kept: list[str] = []
     for index, word in enumerate(words):
         after_noise = index > 0 and words[index - 1] in _NOISE and word.isdigit()
-        if word in _NOISE and not (word == "joint" and kept) or after_noise:
+        if (word in _NOISE and not (word == "joint" and kept)) or after_noise:
             continue
         kept.append(word)
     while len(kept) > 1 and kept[0].isdigit():

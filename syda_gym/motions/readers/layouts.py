@@ -18,15 +18,19 @@ KINECT_JOINTS = (
 
 AZURE_JOINTS = (
     "Pelvis", "SpineNavel", "SpineChest", "Neck", "ClavicleLeft", "ShoulderLeft", "ElbowLeft", "WristLeft", "HandLeft",
-    "HandTipLeft", "ThumbLeft", "ClavicleRight", "ShoulderRight", "ElbowRight", "WristRight", "HandRight", "HandTipRight",
-    "ThumbRight", "HipLeft", "KneeLeft", "AnkleLeft", "FootLeft", "HipRight", "KneeRight", "AnkleRight", "FootRight", "Head",
+    "HandTipLeft", "ThumbLeft", "ClavicleRight", "ShoulderRight", "ElbowRight", "WristRight", "HandRight",
+    "HandTipRight",
+    "ThumbRight", "HipLeft", "KneeLeft", "AnkleLeft", "FootLeft", "HipRight", "KneeRight", "AnkleRight", "FootRight",
+    "Head",
     "Nose", "EyeLeft", "EarLeft", "EyeRight", "EarRight",
 )  # fmt: skip
 """The 32 joints of Azure Kinect in the order of the body tracking SDK."""
 
 MEDIAPIPE_JOINTS = (
-    "nose", "left_eye_inner", "left_eye", "left_eye_outer", "right_eye_inner", "right_eye", "right_eye_outer", "left_ear",
-    "right_ear", "mouth_left", "mouth_right", "left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist",
+    "nose", "left_eye_inner", "left_eye", "left_eye_outer", "right_eye_inner", "right_eye", "right_eye_outer",
+    "left_ear",
+    "right_ear", "mouth_left", "mouth_right", "left_shoulder", "right_shoulder", "left_elbow", "right_elbow",
+    "left_wrist",
     "right_wrist", "left_pinky", "right_pinky", "left_index", "right_index", "left_thumb", "right_thumb", "left_hip",
     "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle", "left_heel", "right_heel", "left_foot_index",
     "right_foot_index",
@@ -79,11 +83,10 @@ _MEDIAPIPE = _of(
     "LFoot RFoot - - LToe RToe"
 )
 _KINECT1 = _of(
-    "Pelvis Torso Neck Head LShoulder LElbow LHand - RShoulder RElbow RHand - LHip LKnee LFoot LToe RHip RKnee RFoot RToe"
+    "Pelvis Torso Neck Head LShoulder LElbow LHand - RShoulder RElbow RHand - LHip LKnee LFoot LToe RHip RKnee RFoot "
+    "RToe"
 )
-_NITE2 = _of(
-    "Head Neck LShoulder RShoulder LElbow RElbow LHand RHand Torso LHip RHip LKnee RKnee LFoot RFoot"
-)
+_NITE2 = _of("Head Neck LShoulder RShoulder LElbow RElbow LHand RHand Torso LHip RHip LKnee RKnee LFoot RFoot")
 _COCO = _of("Nose - - Head Head LShoulder RShoulder LElbow RElbow LHand RHand LHip RHip LKnee RKnee LFoot RFoot")
 _SMPL = _of(
     "Pelvis LHip RHip - LKnee RKnee Torso LFoot RFoot - LToe RToe Neck - - Head LShoulder RShoulder LElbow RElbow "
@@ -102,12 +105,15 @@ LAYOUTS: tuple[Layout, ...] = (
     Layout("COCO, 17 keypoints", "keypoints", _COCO, _DOWN, image=True),
     Layout("Human3.6M, 17 joints", "keypoints", _H36M, (0.0, 0.0, 1.0)),
     Layout("MPI-INF-3DHP, 17 joints", "keypoints",
-           _of("- Neck RShoulder RElbow RHand LShoulder LElbow LHand RHip RKnee RFoot LHip LKnee LFoot Pelvis Torso Head"),
+           _of("- Neck RShoulder RElbow RHand LShoulder LElbow LHand RHip RKnee RFoot LHip LKnee LFoot Pelvis Torso "
+           "Head"),
            _DOWN),
     Layout("Human3.6M, 16 joints", "keypoints",
-           _of("Pelvis RHip RKnee RFoot LHip LKnee LFoot Torso Neck Head LShoulder LElbow LHand RShoulder RElbow RHand")),
+           _of("Pelvis RHip RKnee RFoot LHip LKnee LFoot Torso Neck Head LShoulder LElbow LHand RShoulder RElbow "
+               "RHand")),
     Layout("Human3.6M, 32 joints", "keypoints",
-           _of("Pelvis RHip RKnee RFoot RToe - LHip LKnee LFoot LToe - - Torso Neck - Head - LShoulder LElbow LHand - - - - - "
+           _of("Pelvis RHip RKnee RFoot RToe - LHip LKnee LFoot LToe - - Torso Neck - Head - LShoulder LElbow LHand "
+           "- - - - - "
                "RShoulder RElbow RHand - - - -"), (0.0, 0.0, 1.0)),
     Layout("SMPL, 22 joints", "keypoints", _SMPL),
     Layout("SMPL, 23 joints", "keypoints", (*_SMPL, "-")),
@@ -116,25 +122,32 @@ LAYOUTS: tuple[Layout, ...] = (
     Layout("SMPL-H, 52 joints", "keypoints", (*_SMPL, *("-",) * 30)),
     Layout("SMPL-X, 55 joints", "keypoints", (*_SMPL, *("-",) * 33)),
     Layout("LAFAN, 22 joints", "keypoints",
-           _of("Pelvis LHip LKnee LFoot LToe RHip RKnee RFoot RToe - Torso - Neck Head - LShoulder LElbow LHand - RShoulder "
+           _of("Pelvis LHip LKnee LFoot LToe RHip RKnee RFoot RToe - Torso - Neck Head - LShoulder LElbow LHand - "
+           "RShoulder "
                "RElbow RHand")),
     Layout("Xsens, 23 joints", "keypoints",
-           _of("Pelvis - Torso - - Neck Head - RShoulder RElbow RHand - LShoulder LElbow LHand RHip RKnee RFoot RToe LHip LKnee "
+           _of("Pelvis - Torso - - Neck Head - RShoulder RElbow RHand - LShoulder LElbow LHand RHip RKnee RFoot RToe "
+           "LHip LKnee "
                "LFoot LToe"), (0.0, 0.0, 1.0)),
     Layout("KIT, 21 joints", "keypoints",
-           _of("Pelvis - Torso Neck Head RShoulder RElbow RHand LShoulder LElbow LHand RHip RKnee RFoot - RToe LHip LKnee LFoot "
+           _of("Pelvis - Torso Neck Head RShoulder RElbow RHand LShoulder LElbow LHand RHip RKnee RFoot - RToe LHip "
+           "LKnee LFoot "
                "- LToe")),
     Layout("TotalCapture, 21 joints", "keypoints",
-           _of("Pelvis - Torso - - Neck Head RShoulder RElbow RHand - LShoulder LElbow LHand - RHip RKnee RFoot LHip LKnee "
+           _of("Pelvis - Torso - - Neck Head RShoulder RElbow RHand - LShoulder LElbow LHand - RHip RKnee RFoot LHip "
+           "LKnee "
                "LFoot")),
     Layout("OpenPose, 25 keypoints", "keypoints",
-           _of("Nose Neck RShoulder RElbow RHand LShoulder LElbow LHand Pelvis RHip RKnee RFoot LHip LKnee LFoot - - Head Head "
+           _of("Nose Neck RShoulder RElbow RHand LShoulder LElbow LHand Pelvis RHip RKnee RFoot LHip LKnee LFoot - - "
+           "Head Head "
                "LToe - - RToe - -"), _DOWN, zero_is_gap=True, image=True),
     Layout("OpenPose, 18 keypoints", "keypoints",
-           _of("Nose Neck RShoulder RElbow RHand LShoulder LElbow LHand RHip RKnee RFoot LHip LKnee LFoot - - Head Head"), _DOWN,
+           _of("Nose Neck RShoulder RElbow RHand LShoulder LElbow LHand RHip RKnee RFoot LHip LKnee LFoot - - Head "
+               "Head"), _DOWN,
            zero_is_gap=True, image=True),
     Layout("Panoptic, 19 joints", "keypoints",
-           _of("Neck Nose Pelvis LShoulder LElbow LHand LHip LKnee LFoot RShoulder RElbow RHand RHip RKnee RFoot - Head - Head"),
+           _of("Neck Nose Pelvis LShoulder LElbow LHand LHip LKnee LFoot RShoulder RElbow RHand RHip RKnee RFoot - "
+           "Head - Head"),
            _DOWN),
     Layout("HALPE, 26 keypoints", "keypoints", (*_COCO, *_of("- Neck Pelvis LToe RToe - - - -")), _DOWN, image=True),
     Layout("LSP, 14 joints", "keypoints",

@@ -12,21 +12,26 @@ __all__ = ["joint_points"]
 # software computed, then pairs of markers on both sides of the joint, then one marker. Names of Plug-in Gait, OpenSim's
 # models, the ISB and Visual3D.
 _SIDED: dict[str, tuple[tuple[str, ...], ...]] = {
-    "Shoulder": (("SJC",), ("SHOULDERJC",), ("SHO",), ("ACR",), ("ACJ",), ("AC",), ("ACROMIUM",), ("ACROMION",), ("SHOULDER",)),
+    "Shoulder": (("SJC",), ("SHOULDERJC",), ("SHO",), ("ACR",), ("ACJ",), ("AC",), ("ACROMIUM",), ("ACROMION",),
+    ("SHOULDER",)),
     "Elbow": (
         ("EJC",), ("ELBOWJC",), ("ELB", "ELBM"), ("ELB", "MELB"), ("LELB", "MELB"), ("ELBL", "ELBM"), ("LEL", "MEL"),
         ("LHE", "MHE"), ("LEP", "MEP"), ("HLE", "HME"), ("ELBOWLATERAL", "ELBOWMEDIAL"), ("ELBOWLAT", "ELBOWMED"),
         ("ELBOUT", "ELBIN"), ("ELB",), ("LEL",), ("LHE",), ("LEP",), ("HLE",), ("ELBOWLATERAL",), ("ELBOW",),
     ),
     "Hand": (
-        ("WJC",), ("WRISTJC",), ("WRA", "WRB"), ("WRLAT", "WRMED"), ("WRISTLAT", "WRISTMED"), ("WRISTRADIUS", "WRISTULNA"),
-        ("FARADIUS", "FAULNA"), ("RSP", "USP"), ("RS", "US"), ("WRR", "WRU"), ("WRT", "WRP"), ("IWR", "OWR"), ("WROUT", "WRIN"),
+        ("WJC",), ("WRISTJC",), ("WRA", "WRB"), ("WRLAT", "WRMED"), ("WRISTLAT", "WRISTMED"), ("WRISTRADIUS",
+        "WRISTULNA"),
+        ("FARADIUS", "FAULNA"), ("RSP", "USP"), ("RS", "US"), ("WRR", "WRU"), ("WRT", "WRP"), ("IWR", "OWR"),
+        ("WROUT", "WRIN"),
         ("WRISTOUT", "WRISTIN"), ("RAD", "ULN"), ("WRB",), ("WRA",), ("WRI",), ("WRT",), ("WRIST",), ("RAD",), ("ULN",),
     ),
     "Hip": (("HJC",), ("ASI",), ("ASIS",), ("IAS",), ("HIP",)),
-    "Knee": (("KJC",), ("KNE", "KNM"), ("KNE", "MKNE"), ("KNEL", "KNEM"), ("LFC", "MFC"), ("LFE", "MFE"), ("FLE", "FME"), ("KNE",),
+    "Knee": (("KJC",), ("KNE", "KNM"), ("KNE", "MKNE"), ("KNEL", "KNEM"), ("LFC", "MFC"), ("LFE", "MFE"), ("FLE",
+    "FME"), ("KNE",),
              ("KNEELATERAL", "KNEEMEDIAL"), ("LFC",), ("FLE",), ("KNEE",)),
-    "Foot": (("AJC",), ("ANK", "MED"), ("ANK", "MANK"), ("LMAL", "MMAL"), ("FAL", "TAM"), ("ANK",), ("LMAL",), ("FAL",), ("ANKLE",)),
+    "Foot": (("AJC",), ("ANK", "MED"), ("ANK", "MANK"), ("LMAL", "MMAL"), ("FAL", "TAM"), ("ANK",), ("LMAL",), ("FAL",
+    ), ("ANKLE",)),
     "Toe": (("TOE",), ("MT2",), ("FM2",), ("MT1", "MT5"), ("FM1", "FM5")),
 }  # fmt: skip
 _CENTRAL: dict[str, tuple[tuple[str, ...], ...]] = {
@@ -46,7 +51,7 @@ def joint_points(names: Sequence[str], parents: Sequence[int] | None = None) -> 
     Returns:
         Canonical joint to the indices of the points whose middle it is; joints that are not found are left out.
     """
-    found = {joint: (index,) for joint, index in match_indices(names, parents).items()}
+    found: dict[str, tuple[int, ...]] = {joint: (index,) for joint, index in match_indices(names, parents).items()}
     if parents is not None:
         return found
     places: dict[str, int] = {}

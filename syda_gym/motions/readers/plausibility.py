@@ -1,8 +1,8 @@
 """Is this a person? The same questions for every format, asked of joint positions alone.
 
-Limbs keep their length and are as long on the left as on the right; forearm, upper arm, trunk and legs are in proportion;
-the head is on the other side of the shoulders than the hips. What fails is refused or doubted aloud, and where a file may
-be read in several ways, the way that fails least is taken.
+Limbs keep their length and are as long on the left as on the right; forearm, upper arm, trunk and legs are in
+proportion; the head is on the other side of the shoulders than the hips. What fails is refused or doubted aloud, and
+where a file may be read in several ways, the way that fails least is taken.
 """
 
 from __future__ import annotations
@@ -16,7 +16,12 @@ from syda_gym.embodiments.embodiment import FloatArray
 
 __all__ = ["Finding", "bends_backward", "examine"]
 
-_LIMBS = (("Shoulder", "Elbow", "upper arm"), ("Elbow", "Hand", "forearm"), ("Hip", "Knee", "thigh"), ("Knee", "Foot", "shin"))
+_LIMBS = (
+    ("Shoulder", "Elbow", "upper arm"),
+    ("Elbow", "Hand", "forearm"),
+    ("Hip", "Knee", "thigh"),
+    ("Knee", "Foot", "shin"),
+)
 _SAMPLE = 400  # frames that are looked at
 _SIDE_NAMES = {"L": "left", "R": "right"}
 # Ratios of a grown or growing person, generous to both sides for sensors that put joints elsewhere.
@@ -70,8 +75,9 @@ def examine(joints: Mapping[str, FloatArray]) -> list[Finding]:
                 findings.append(
                     Finding(
                         f"the {_SIDE_NAMES[side]} {limb} changes its length by {100 * spread:.0f} %",
-                        min(3.0, spread / 0.2), "arm" in limb,
-                    )  # fmt: skip
+                        min(3.0, spread / 0.2),
+                        "arm" in limb,
+                    )
                 )
     findings += _uneven(lengths)
     findings += _ratios(sample, {limb: float(np.mean(list(sides.values()))) for limb, sides in lengths.items()})
@@ -115,14 +121,14 @@ def _ratios(sample: Mapping[str, FloatArray], lengths: dict[str, float]) -> list
         if part in known and known.get(whole, 0.0) > 0.0:
             ratio = known[part] / known[whole]
             if not low <= ratio <= high:
-                beyond = float(np.log(high / ratio) if ratio < low and low == 0 else
-                               np.log(low / max(ratio, 1e-9)) if ratio < low else np.log(ratio / high))  # fmt: skip
+                beyond = float(np.log(low / max(ratio, 1e-9)) if ratio < low else np.log(ratio / high))
                 article = "the " if part != "neck to head" else ""
                 findings.append(
                     Finding(
-                        f"{article}{part} is {ratio:.2g} times the {whole}", min(3.0, 0.6 + beyond / 0.4),
+                        f"{article}{part} is {ratio:.2g} times the {whole}",
+                        min(3.0, 0.6 + beyond / 0.4),
                         part in ("forearm", "shoulder width"),
-                    )  # fmt: skip
+                    )
                 )
     return findings
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -112,7 +111,7 @@ def told(
 
 def _layout(path: str | os.PathLike[str]) -> Said:
     data = read_yaml(path, "a layout (YAML with 'joints' or 'order')", OptionError)
-    takers = {
+    takers: dict[str, Callable[[object], tuple[str, Any]]] = {
         "joints": lambda value: ("joints", _joints(value)),
         "order": lambda value: ("order", _order(value)),
         "unit": lambda value: ("unit", _unit(value)),

@@ -131,7 +131,8 @@ def _check_person(recording: Recording, joints: Mapping[str, FloatArray], told: 
     arms = [finding for finding in findings if finding.arms]
     if sum(finding.weight for finding in arms) > _NO_PERSON and not told:
         raise MotionError(
-            f"{recording.path}: these are no person's arms: {', '.join(finding.text for finding in arms[:3])}. Are other joints "
+            f"{recording.path}: these are no person's arms: {', '.join(finding.text for finding in arms[:3])}. Are "
+            f"other joints "
             "meant? Say which is which: --joints LShoulder=..., LElbow=..., LHand=..."
         )
     for finding in findings:
@@ -153,9 +154,13 @@ def _scale(recording: Recording, joints: Mapping[str, FloatArray], sides: tuple[
         raise MotionError(f"{recording.path}: shoulder, elbow and hand coincide; expected an arm of some length")
     for unit, source in ((said.unit, "as was said"), (recording.unit, "as the file says")):
         if unit is not None:
-            recording.notes.append(f"units: {unit:g} m, {source} (the arm is {arm:.3g} long, that is {arm * unit:.3f} m)")
+            recording.notes.append(
+                f"units: {unit:g} m, {source} (the arm is {arm:.3g} long, that is {arm * unit:.3f} m)"
+            )
             if not 0.2 <= arm * unit <= 1.0:
-                recording.doubt(f"the arm is {arm * unit:.3g} m long with units of {unit:g} m, {source}; --unit says another")
+                recording.doubt(
+                    f"the arm is {arm * unit:.3g} m long with units of {unit:g} m, {source}; --unit says another"
+                )
             return unit
     cmu = bool(_CMU_JOINTS & set(recording.names))
     scored = sorted(
@@ -174,7 +179,8 @@ def _scale(recording: Recording, joints: Mapping[str, FloatArray], sides: tuple[
     if len(scored) > 1 and scored[1][0] < score + _NEAR:
         _, other, factor = scored[1]
         recording.doubt(
-            f"units may be {other} as well: the arm is {arm * scale:.2f} m long in {name}, {arm * factor:.2f} m in {other}; --unit "
+            f"units may be {other} as well: the arm is {arm * scale:.2f} m long in {name}, {arm * factor:.2f} m in "
+            f"{other}; --unit "
             "says which"
         )
     return scale
@@ -207,7 +213,9 @@ def _basis(
     if swing > 25.0:
         recording.notes.append(f"the subject turns by up to {swing:.0f} degrees; the turn is taken out")
     if trunk is not None and trunk > 35.0:
-        recording.doubt(f"the trunk leans {trunk:.0f} degrees from {_axis_name(up)}; is that really up? --up says which axis is")
+        recording.doubt(
+            f"the trunk leans {trunk:.0f} degrees from {_axis_name(up)}; is that really up? --up says which axis is"
+        )
     return basis
 
 
@@ -272,7 +280,9 @@ def _check_forward(recording: Recording, joints: Mapping[str, FloatArray], basis
     if votes and max(votes) < -0.02:
         recording.doubt("toes or nose point backward: left and right seem swapped, or an axis mirrored")
     elif backward:
-        recording.doubt("elbows bend backward: left and right seem swapped, an axis mirrored, or other joints are meant")
+        recording.doubt(
+            "elbows bend backward: left and right seem swapped, an axis mirrored, or other joints are meant"
+        )
 
 
 def _human(

@@ -26,8 +26,8 @@ _SEPARATORS = re.compile(r"[,;\s]+")
 def read_lines(path: Path, kind: str) -> list[str]:
     """The lines of a text recording without line ends.
 
-    UTF-8 and UTF-16 with a mark are told by it; anything else that is no UTF-8 is read as Latin-1: names may have accents,
-    the numbers read the same.
+    UTF-8 and UTF-16 with a mark are told by it; anything else that is no UTF-8 is read as Latin-1: names may have
+    accents, the numbers read the same.
 
     Args:
         path: the file.

@@ -2,8 +2,8 @@
 
 A column called *timestamp* holds seconds, milliseconds, microseconds, ticks of 100 ns (Kinect, .NET) or nanoseconds.
 Only microseconds and ticks are a factor of ten apart; there the rate decides: people are recorded at 30 frames per
-second, less often at 60, 25, 100 or 120, hardly ever at 3 or 300. A date (seconds since 1970, ticks since year 1 or 1601)
-decides before that.
+second, less often at 60, 25, 100 or 120, hardly ever at 3 or 300. A date (seconds since 1970, ticks since year 1 or
+1601) decides before that.
 """
 
 from __future__ import annotations
@@ -23,20 +23,23 @@ CLOCKS: dict[str, str | None] = {
     "time": None, "times": None, "timestamp": None, "timestamps": None, "t": None, "clock": None, "stamp": None,
     "relativetime": None, "captime": None, "devicetime": None, "systemtime": None, "elapsed": None, "datetime": None,
     "date": None, "sec": "s", "secs": "s", "second": "s", "seconds": "s", "millis": "ms", "msec": "ms", "ms": "ms",
-    "millisecond": "ms", "milliseconds": "ms", "us": "us", "usec": "us", "micros": "us", "microseconds": "us", "ns": "ns",
+    "millisecond": "ms", "milliseconds": "ms", "us": "us", "usec": "us", "micros": "us", "microseconds": "us",
+    "ns": "ns",
     "nsec": "ns", "nanoseconds": "ns", "ticks": "ticks", "zeit": None, "temps": None,
     "tiempo": None, "tempo": None,
 }  # fmt: skip
 """How columns of time are called, with the unit where the name says it."""
 
-_ENDINGS = {"s": "s", "sec": "s", "secs": "s", "seconds": "s", "ms": "ms", "msec": "ms", "milliseconds": "ms", "us": "us",
+_ENDINGS = {"s": "s", "sec": "s", "secs": "s", "seconds": "s", "ms": "ms", "msec": "ms", "milliseconds": "ms",
+"us": "us",
             "usec": "us", "microseconds": "us", "ns": "ns", "nsec": "ns", "ticks": "ticks"}  # fmt: skip
 _BEGINNINGS = {"time", "times", "timestamp", "timestamps", "t", "clock", "elapsed", "frametime", "device", "system",
                "zeit", "temps"}  # fmt: skip
 _WORDS = {"in", "time", "timestamp", "stamp", "of", "frame", "frametime"}
 
 # Rates at which people are recorded, and how much more likely than others they are (in units of the natural logarithm).
-_USUAL = {30.0: 1.2, 60.0: 1.0, 25.0: 0.7, 24.0: 0.5, 15.0: 0.7, 50.0: 0.6, 100.0: 0.6, 120.0: 0.8, 10.0: 0.5, 20.0: 0.4,
+_USUAL = {30.0: 1.2, 60.0: 1.0, 25.0: 0.7, 24.0: 0.5, 15.0: 0.7, 50.0: 0.6, 100.0: 0.6, 120.0: 0.8, 10.0: 0.5,
+20.0: 0.4,
           12.0: 0.1, 90.0: 0.3, 200.0: 0.2, 240.0: 0.3, 125.0: 0.1, 150.0: 0.1}  # fmt: skip
 _SLOWEST, _FASTEST = 0.1, 1_500.0
 _SURE = 0.9  # how much likelier the best unit must be than the next
@@ -68,8 +71,10 @@ def clock_unit(name: str) -> tuple[bool, str | None]:
         return True, CLOCKS[joined]
     if len(words) > 1 and words[0] in _BEGINNINGS and words[-1] in _ENDINGS and set(words[1:-1]) <= _WORDS:
         return True, _ENDINGS[words[-1]]
-    if len(words) > 1 and words[-1] in ("timestamp", "time", "stamp") and set(words[:-1]) <= {"frame", "device", "system",
-                                                                                            "capture", "relative"}:  # fmt: skip
+    if len(words) > 1 and words[-1] in ("timestamp", "time", "stamp") and set(words[:-1]) <= {"frame", "device",
+    "system",
+                                                                                            "capture",
+                                                                                            "relative"}:  # fmt: skip
         return True, None
     return False, None
 
@@ -78,7 +83,8 @@ def seconds(stamps: Stamps) -> tuple[FloatArray | None, str | None]:
     """Times in seconds.
 
     Returns:
-        ``(N,)`` [s], or ``None`` if the values count frames and are no times; and a doubt to say aloud, if there is one.
+        ``(N,)`` [s], or ``None`` if the values count frames and are no times; and a doubt to say aloud, if there is
+        one.
     """
     values = np.asarray(stamps.values, dtype=np.float64)
     known = values[np.isfinite(values)]
@@ -145,6 +151,10 @@ def _score(step: float, known: FloatArray, size: float) -> float:
 
 
 def _words(unit: str) -> str:
-    return {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ticks": "ticks of 100 ns", "ns": "nanoseconds"}[
-        unit
-    ]
+    return {
+        "s": "seconds",
+        "ms": "milliseconds",
+        "us": "microseconds",
+        "ticks": "ticks of 100 ns",
+        "ns": "nanoseconds",
+    }[unit]

@@ -1,7 +1,7 @@
 """The arms of the small case files, read by plain code that shares nothing with the library.
 
-Every reading gives ``(N, 2, 3, 3)``: left and right arm, shoulder, elbow and wrist, in the file's own axes; with the axes in
-which its subject looks forward and has left and up.
+Every reading gives ``(N, 2, 3, 3)``: left and right arm, shoulder, elbow and wrist, in the file's own axes; with the
+axes in which its subject looks forward and has left and up.
 """
 
 from __future__ import annotations

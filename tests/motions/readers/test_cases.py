@@ -1,4 +1,5 @@
-"""37 small made-up files, one of each kind that people have: read as an independent reading reads them, or refused in our words."""
+"""37 small made-up files, one of each kind that people have: read as an independent reading reads them, or refused
+in our words."""
 
 from __future__ import annotations
 
@@ -47,7 +48,11 @@ def test_case(path: Path) -> None:
     angles = np.degrees(np.arccos(np.clip((links * truth).sum(axis=-1), -1.0, 1.0)))
     assert angles.max() < 2.0
     # What the files were made of: left upper arm 20 degrees above level, right arm hanging 10 degrees out.
-    np.testing.assert_allclose(links[:, 0, 0], np.broadcast_to([0.0, np.cos(np.deg2rad(20)), np.sin(np.deg2rad(20))], (len(links), 3)), atol=0.03)
+    np.testing.assert_allclose(
+        links[:, 0, 0],
+        np.broadcast_to([0.0, np.cos(np.deg2rad(20)), np.sin(np.deg2rad(20))], (len(links), 3)),
+        atol=0.03,
+    )
     np.testing.assert_allclose(links[:, 1, :, 2], -np.cos(np.deg2rad(10)), atol=0.03)
     assert clip.fps == pytest.approx(RATES.get(path.name, 30.0), rel=0.01)
     if path.name in ALOUD:
@@ -76,4 +81,6 @@ def test_a_blank_line_between_frames_changes_nothing() -> None:
 
 def test_every_case_says_what_is_right() -> None:
     page = (Path(__file__).parent / "cases" / "README.md").read_text()
-    assert {path.name for path in CASES} == set(re.findall(r"^- `([\w.]+\.(?!py)\w+)`", page, re.MULTILINE)) - {"live_cases.py"}
+    assert {path.name for path in CASES} == set(re.findall(r"^- `([\w.]+\.(?!py)\w+)`", page, re.MULTILINE)) - {
+        "live_cases.py"
+    }

@@ -16,8 +16,8 @@ from syda_gym.errors import MotionError
 from syda_gym.motions import load_motions
 from syda_gym.motions.readers import text
 from syda_gym.motions.readers.bvh.read import read_bvh
-from syda_gym.motions.readers.tables.read import read_kinect, read_openni
 from syda_gym.motions.readers.dispatch import read_mediapipe
+from syda_gym.motions.readers.tables.read import read_kinect, read_openni
 from tests.motions import recordings as rec
 
 pytestmark = pytest.mark.filterwarnings("ignore::syda_gym.motions.readers.skeleton.MotionWarning")
@@ -76,7 +76,10 @@ def test_damaged_bvh(tmp_path: Path, content: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        (_replaced(KINECT, 5, KINECT[5][:300]), r"line 6: \d+ columns, the lines before have 101; is the file truncated"),
+        (
+            _replaced(KINECT, 5, KINECT[5][:300]),
+            r"line 6: \d+ columns, the lines before have 101; is the file truncated",
+        ),
         (_replaced(KINECT, 2, KINECT[2].replace(",2,", ",7,", 1)), "line 3: a tracking state is none of 0, 1 and 2"),
         (_replaced(KINECT, 2, "x" + KINECT[2]), "line 3, column 1: 'x8"),
         (_replaced(KINECT, 3, KINECT[1]), "line 4: time runs backward"),

@@ -1,4 +1,5 @@
-"""Other labs' styles, written from a person whose limbs are known: each is read to the same limbs, or refused with a reason."""
+"""Other labs' styles, written from a person whose limbs are known: each is read to the same limbs, or refused with a
+reason."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ UNITY = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])  # left-h
 ARMS = [f"{side}{part}" for side in "LR" for part in ("Shoulder", "Elbow", "Hand")]
 
 
-def _person(axes: np.ndarray = Z_UP, unit: float = 1.0, place: tuple[float, float, float] = (0.2, -0.4, 0.9)) -> dict[str, np.ndarray]:
+def _person(
+    axes: np.ndarray = Z_UP, unit: float = 1.0, place: tuple[float, float, float] = (0.2, -0.4, 0.9)
+) -> dict[str, np.ndarray]:
     _, joints = rec.moving_human(count=COUNT)
     ahead = np.array([0.12, 0.0, 0.0])
     for side in "LR":
@@ -63,7 +66,8 @@ def _flat(joints: dict[str, np.ndarray], names: list[str]) -> np.ndarray:
 
 NAMED = [*ARMS, "LHip", "LKnee", "LFoot", "RHip", "RKnee", "RFoot", "Head", "Neck", "Pelvis"]
 TIME = (np.arange(COUNT) / 100.0)[:, None]
-PLUG_IN = ["LSHO", "LELB", "LWRA", "LWRB", "RSHO", "RELB", "RWRA", "RWRB", "LASI", "RASI", "LKNE", "RKNE", "LANK", "RANK", "LTOE",
+PLUG_IN = ["LSHO", "LELB", "LWRA", "LWRB", "RSHO", "RELB", "RWRA", "RWRB", "LASI", "RASI", "LKNE", "RKNE", "LANK",
+"RANK", "LTOE",
            "RTOE", "C7", "LFHD", "RFHD", "LBHD", "RBHD"]  # fmt: skip
 
 
@@ -72,9 +76,12 @@ def _markers(unit: float = 1000.0) -> dict[str, np.ndarray]:
     beside = np.array([0.0, 0.0, 0.03 * unit])
     found = {}
     for side in "LR":
-        found |= {f"{side}SHO": joints[f"{side}Shoulder"], f"{side}ELB": joints[f"{side}Elbow"], f"{side}WRA": joints[f"{side}Hand"] + beside,
-                  f"{side}WRB": joints[f"{side}Hand"] - beside, f"{side}ASI": joints[f"{side}Hip"], f"{side}KNE": joints[f"{side}Knee"],
-                  f"{side}ANK": joints[f"{side}Foot"], f"{side}TOE": joints[f"{side}Toe"], f"{side}FHD": joints["Head"] + beside,
+        found |= {f"{side}SHO": joints[f"{side}Shoulder"], f"{side}ELB": joints[f"{side}Elbow"],
+        f"{side}WRA": joints[f"{side}Hand"] + beside,
+                  f"{side}WRB": joints[f"{side}Hand"] - beside, f"{side}ASI": joints[f"{side}Hip"],
+                  f"{side}KNE": joints[f"{side}Knee"],
+                  f"{side}ANK": joints[f"{side}Foot"], f"{side}TOE": joints[f"{side}Toe"],
+                  f"{side}FHD": joints["Head"] + beside,
                   f"{side}BHD": joints["Head"] - beside}  # fmt: skip
     found["C7"] = joints["Neck"]
     return {name: found[name] for name in PLUG_IN}
@@ -93,7 +100,16 @@ def trc(path: Path) -> Path:
     table = np.concatenate([np.arange(COUNT)[:, None] + 1.0, TIME, *marks.values()], axis=1)
     head = [
         ["PathFileType", "4", "(X/Y/Z)", "walk.trc"],
-        ["DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame", "OrigNumFrames"],
+        [
+            "DataRate",
+            "CameraRate",
+            "NumFrames",
+            "NumMarkers",
+            "Units",
+            "OrigDataRate",
+            "OrigDataStartFrame",
+            "OrigNumFrames",
+        ],
         ["100.0", "100.0", str(COUNT), str(len(marks)), "mm", "100.0", "1", str(COUNT)],
         ["Frame#", "Time", *(cell for name in marks for cell in (name, "", ""))],
         ["", "", *(f"{axis}{i + 1}" for i in range(len(marks)) for axis in "XYZ")],
@@ -103,8 +119,10 @@ def trc(path: Path) -> Path:
 
 
 def optitrack_csv(path: Path) -> Path:
-    names = {"Hip": "Pelvis", "Neck": "Neck", "Head": "Head", "LUArm": "LShoulder", "LFArm": "LElbow", "LHand": "LHand", "RUArm": "RShoulder",
-             "RFArm": "RElbow", "RHand": "RHand", "LThigh": "LHip", "LShin": "LKnee", "LFoot": "LFoot", "RThigh": "RHip", "RShin": "RKnee",
+    names = {"Hip": "Pelvis", "Neck": "Neck", "Head": "Head", "LUArm": "LShoulder", "LFArm": "LElbow",
+    "LHand": "LHand", "RUArm": "RShoulder",
+             "RFArm": "RElbow", "RHand": "RHand", "LThigh": "LHip", "LShin": "LKnee", "LFoot": "LFoot",
+             "RThigh": "RHip", "RShin": "RKnee",
              "RFoot": "RFoot", "LToe": "LToe", "RToe": "RToe"}  # fmt: skip
     joints = _person(UNITY @ np.diag([1.0, 1.0, 1.0]) * [[-1.0], [1.0], [1.0]])
     columns = []
@@ -148,13 +166,19 @@ def with_units_and_turns(path: Path) -> Path:
     header = ["Timestamp (ms)"]
     columns = [1000.0 * TIME]
     for name in NAMED:
-        header += [f"{name}.position.x", f"{name}.position.y", f"{name}.position.z", *(f"{name}.rotation.{axis}" for axis in "xyzw")]
+        header += [
+            f"{name}.position.x",
+            f"{name}.position.y",
+            f"{name}.position.z",
+            *(f"{name}.rotation.{axis}" for axis in "xyzw"),
+        ]
         columns += [joints[name], np.full((COUNT, 4), 0.3)]
     return _csv(path / "unreal.csv", [header], np.concatenate(columns, axis=1))
 
 
 def msrc12(path: Path) -> Path:
-    order = "Pelvis Torso Neck Head LShoulder LElbow LHand LHand RShoulder RElbow RHand RHand LHip LKnee LFoot LToe RHip RKnee RFoot RToe"
+    order = "Pelvis Torso Neck Head LShoulder LElbow LHand LHand RShoulder RElbow RHand RHand LHip LKnee LFoot LToe "
+    "RHip RKnee RFoot RToe"
     points = np.concatenate([_order(order, _person(rec.KINECT_AXES)), np.full((COUNT, 20, 1), 2.0)], axis=2)
     ticks = 634_000_000_000_000.0 + np.arange(COUNT)[:, None] * 333_333.0
     return _csv(path / "P1_1_1_p06.csv", [], np.concatenate([ticks, points.reshape(COUNT, -1)], axis=1), " ")
@@ -162,8 +186,10 @@ def msrc12(path: Path) -> Path:
 
 def kinect_json(path: Path) -> Path:
     joints = _person(rec.KINECT_AXES)
-    names = {"SpineBase": "Pelvis", "SpineMid": "Torso", "SpineShoulder": "Neck", "Head": "Head", "ShoulderLeft": "LShoulder",
-             "ElbowLeft": "LElbow", "WristLeft": "LHand", "ShoulderRight": "RShoulder", "ElbowRight": "RElbow", "WristRight": "RHand",
+    names = {"SpineBase": "Pelvis", "SpineMid": "Torso", "SpineShoulder": "Neck", "Head": "Head",
+    "ShoulderLeft": "LShoulder",
+             "ElbowLeft": "LElbow", "WristLeft": "LHand", "ShoulderRight": "RShoulder", "ElbowRight": "RElbow",
+             "WristRight": "RHand",
              "HipLeft": "LHip", "HipRight": "RHip"}  # fmt: skip
     frames = [
         {"RelativeTime": 333_333 * t, "Bodies": [{"TrackingId": 7, "Joints": {
@@ -176,8 +202,10 @@ def kinect_json(path: Path) -> Path:
 
 def tfjs(path: Path) -> Path:
     table = rec.mediapipe_table(COUNT)
-    names = ["nose", *[f"p{i}" for i in range(1, 11)], "left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist",
-             "right_wrist", *[f"q{i}" for i in range(17, 23)], "left_hip", "right_hip", "left_knee", "right_knee", "left_ankle",
+    names = ["nose", *[f"p{i}" for i in range(1, 11)], "left_shoulder", "right_shoulder", "left_elbow", "right_elbow",
+    "left_wrist",
+             "right_wrist", *[f"q{i}" for i in range(17, 23)], "left_hip", "right_hip", "left_knee", "right_knee",
+             "left_ankle",
              "right_ankle", "left_heel", "right_heel", "left_foot_index", "right_foot_index"]  # fmt: skip
     frames = [
         [{"score": 0.9, "keypoints": [{"x": 100.0, "y": 90.0, "name": name} for name in names],
@@ -197,14 +225,21 @@ def landmark_x(path: Path) -> Path:
 def underscore(path: Path) -> Path:
     table = rec.mediapipe_table(COUNT)
     header = [f"{axis}_{p}" for p in range(33) for axis in ("x", "y", "z")]
-    return _csv(path / "x_0.csv", [["timestamp_ms", *header]], np.concatenate([1000 * TIME, table[:, :, :3].reshape(COUNT, -1)], axis=1))
+    return _csv(
+        path / "x_0.csv",
+        [["timestamp_ms", *header]],
+        np.concatenate([1000 * TIME, table[:, :, :3].reshape(COUNT, -1)], axis=1),
+    )
 
 
 COCO = "Nose Eye Eye Head Head LShoulder RShoulder LElbow RElbow LHand RHand LHip RHip LKnee RKnee LFoot RFoot"
 H36M = "Pelvis RHip RKnee RFoot LHip LKnee LFoot Torso Neck Nose Head LShoulder LElbow LHand RShoulder RElbow RHand"
-SMPL = "Pelvis LHip RHip Torso LKnee RKnee Torso LFoot RFoot Torso LToe RToe Neck Neck Neck Head LShoulder RShoulder LElbow RElbow LHand RHand"
-LAFAN = "Pelvis LHip LKnee LFoot LToe RHip RKnee RFoot RToe Torso Torso Torso Neck Head Neck LShoulder LElbow LHand Neck RShoulder RElbow RHand"
-XSENS = ("Pelvis Torso Torso Torso Neck Neck Head Neck RShoulder RElbow RHand Neck LShoulder LElbow LHand RHip RKnee RFoot RToe LHip LKnee "
+SMPL = "Pelvis LHip RHip Torso LKnee RKnee Torso LFoot RFoot Torso LToe RToe Neck Neck Neck Head LShoulder RShoulder "
+"LElbow RElbow LHand RHand"
+LAFAN = "Pelvis LHip LKnee LFoot LToe RHip RKnee RFoot RToe Torso Torso Torso Neck Head Neck LShoulder LElbow LHand "
+"Neck RShoulder RElbow RHand"
+XSENS = ("Pelvis Torso Torso Torso Neck Neck Head Neck RShoulder RElbow RHand Neck LShoulder LElbow LHand RHip RKnee "
+"RFoot RToe LHip LKnee "
          "LFoot LToe")  # fmt: skip
 
 
@@ -232,14 +267,19 @@ def transposed(path: Path) -> Path:
 
 
 WRITERS: dict[str, tuple[Callable[[Path], Path], float]] = {
-    "Vicon CSV": (vicon_csv, 100.0), "TRC": (trc, 100.0), "OptiTrack CSV": (optitrack_csv, 100.0), "decimal commas": (german_excel, 100.0),
-    "UTF-16": (utf16, 100.0), "axis before joint": (axis_first, 100.0), "positions beside rotations": (with_units_and_turns, 100.0),
-    "MSRC-12": (msrc12, 30.0), "Kinect JSON": (kinect_json, 30.0), "TF.js keypoints3D": (tfjs, 30.0), "landmark_0_x": (landmark_x, 30.0),
-    "x_0": (underscore, 100.0), "COCO npy": (_array(COCO), 30.0), "Human3.6M npz": (_array(H36M, key="positions_3d"), 100.0),
+    "Vicon CSV": (vicon_csv, 100.0), "TRC": (trc, 100.0), "OptiTrack CSV": (optitrack_csv, 100.0),
+    "decimal commas": (german_excel, 100.0),
+    "UTF-16": (utf16, 100.0), "axis before joint": (axis_first, 100.0),
+    "positions beside rotations": (with_units_and_turns, 100.0),
+    "MSRC-12": (msrc12, 30.0), "Kinect JSON": (kinect_json, 30.0), "TF.js keypoints3D": (tfjs, 30.0),
+    "landmark_0_x": (landmark_x, 30.0),
+    "x_0": (underscore, 100.0), "COCO npy": (_array(COCO), 30.0), "Human3.6M npz": (_array(H36M, key="positions_3d"),
+    100.0),
     "Human3.6M millimetres": (_array(H36M, unit=1000.0), 30.0), "SMPL 22": (_array(SMPL), 30.0),
     "SMPL 23": (_array(SMPL + " LHand", key="any"), 100.0), "SMPL 24 with people": (smpl24, 30.0),
     "SMPL without root": (_array(SMPL.partition(" ")[2] + " LHand RHand"), 30.0), "LAFAN 22": (_array(LAFAN), 30.0),
-    "Xsens 23": (_array(XSENS), 30.0), "axes before points": (transposed, 30.0), "y up array": (_array(COCO, rec.KINECT_AXES), 30.0),
+    "Xsens 23": (_array(XSENS), 30.0), "axes before points": (transposed, 30.0), "y up array": (_array(COCO,
+    rec.KINECT_AXES), 30.0),
 }  # fmt: skip
 
 
@@ -257,26 +297,38 @@ def test_other_styles_give_the_same_limbs(tmp_path: Path, kind: str) -> None:
 
 
 BVH_NAMES = {
-    "Xsens": "Hips LeftHip LeftAnkle RightHip RightAnkle Chest Neck Head LeftCollar LeftShoulder LeftElbow LeftWrist RightCollar RightShoulder "
+    "Xsens": "Hips LeftHip LeftAnkle RightHip RightAnkle Chest Neck Head LeftCollar LeftShoulder LeftElbow LeftWrist "
+    "RightCollar RightShoulder "
              "RightElbow RightWrist",
-    "Unreal": "pelvis thigh_l foot_l thigh_r foot_r spine_01 neck_01 head clavicle_l upperarm_l lowerarm_l hand_l clavicle_r upperarm_r "
+    "Unreal": "pelvis thigh_l foot_l thigh_r foot_r spine_01 neck_01 head clavicle_l upperarm_l lowerarm_l hand_l "
+    "clavicle_r upperarm_r "
               "lowerarm_r hand_r",
-    "VRM": "J_Bip_C_Hips J_Bip_L_UpperLeg J_Bip_L_Foot J_Bip_R_UpperLeg J_Bip_R_Foot J_Bip_C_Spine J_Bip_C_Neck J_Bip_C_Head J_Bip_L_Shoulder "
-           "J_Bip_L_UpperArm J_Bip_L_LowerArm J_Bip_L_Hand J_Bip_R_Shoulder J_Bip_R_UpperArm J_Bip_R_LowerArm J_Bip_R_Hand",
-    "Rigify": "DEF-hips DEF-thigh.L DEF-foot.L DEF-thigh.R DEF-foot.R DEF-spine DEF-neck DEF-head DEF-shoulder.L DEF-upper_arm.L DEF-forearm.L "
+    "VRM": "J_Bip_C_Hips J_Bip_L_UpperLeg J_Bip_L_Foot J_Bip_R_UpperLeg J_Bip_R_Foot J_Bip_C_Spine J_Bip_C_Neck "
+    "J_Bip_C_Head J_Bip_L_Shoulder "
+           "J_Bip_L_UpperArm J_Bip_L_LowerArm J_Bip_L_Hand J_Bip_R_Shoulder J_Bip_R_UpperArm J_Bip_R_LowerArm "
+           "J_Bip_R_Hand",
+    "Rigify": "DEF-hips DEF-thigh.L DEF-foot.L DEF-thigh.R DEF-foot.R DEF-spine DEF-neck DEF-head DEF-shoulder.L "
+    "DEF-upper_arm.L DEF-forearm.L "
               "DEF-hand.L DEF-shoulder.R DEF-upper_arm.R DEF-forearm.R DEF-hand.R",
-    "Rokoko": "Hips LeftThigh LeftFoot RightThigh RightFoot Spine1 Neck Head LeftShoulder LeftArm LeftForeArm LeftHand RightShoulder RightArm "
+    "Rokoko": "Hips LeftThigh LeftFoot RightThigh RightFoot Spine1 Neck Head LeftShoulder LeftArm LeftForeArm "
+    "LeftHand RightShoulder RightArm "
               "RightForeArm RightHand",
-    "Valve": "ValveBiped.Bip01_Pelvis ValveBiped.Bip01_L_Thigh ValveBiped.Bip01_L_Foot ValveBiped.Bip01_R_Thigh ValveBiped.Bip01_R_Foot "
-             "ValveBiped.Bip01_Spine ValveBiped.Bip01_Neck1 ValveBiped.Bip01_Head1 ValveBiped.Bip01_L_Clavicle ValveBiped.Bip01_L_UpperArm "
-             "ValveBiped.Bip01_L_Forearm ValveBiped.Bip01_L_Hand ValveBiped.Bip01_R_Clavicle ValveBiped.Bip01_R_UpperArm "
+    "Valve": "ValveBiped.Bip01_Pelvis ValveBiped.Bip01_L_Thigh ValveBiped.Bip01_L_Foot ValveBiped.Bip01_R_Thigh "
+    "ValveBiped.Bip01_R_Foot "
+             "ValveBiped.Bip01_Spine ValveBiped.Bip01_Neck1 ValveBiped.Bip01_Head1 ValveBiped.Bip01_L_Clavicle "
+             "ValveBiped.Bip01_L_UpperArm "
+             "ValveBiped.Bip01_L_Forearm ValveBiped.Bip01_L_Hand ValveBiped.Bip01_R_Clavicle "
+             "ValveBiped.Bip01_R_UpperArm "
              "ValveBiped.Bip01_R_Forearm ValveBiped.Bip01_R_Hand",
-    "Second Life": "mPelvis mHipLeft mAnkleLeft mHipRight mAnkleRight mTorso mNeck mHead mCollarLeft mShoulderLeft mElbowLeft mWristLeft "
+    "Second Life": "mPelvis mHipLeft mAnkleLeft mHipRight mAnkleRight mTorso mNeck mHead mCollarLeft mShoulderLeft "
+    "mElbowLeft mWristLeft "
                    "mCollarRight mShoulderRight mElbowRight mWristRight",
     "MikuMikuDance": "センター 左足 左足首 右足 右足首 上半身 首 頭 左肩 左腕 左ひじ 左手首 右肩 右腕 右ひじ 右手首",
     "namespaces": " ".join(f"Character1:{name}" for name in rec.CMU),
-    "Character Creator": "CC_Base_Hip CC_Base_L_Thigh CC_Base_L_Foot CC_Base_R_Thigh CC_Base_R_Foot CC_Base_Spine01 CC_Base_NeckTwist01 "
-                         "CC_Base_Head CC_Base_L_Clavicle CC_Base_L_Upperarm CC_Base_L_Forearm CC_Base_L_Hand CC_Base_R_Clavicle "
+    "Character Creator": "CC_Base_Hip CC_Base_L_Thigh CC_Base_L_Foot CC_Base_R_Thigh CC_Base_R_Foot CC_Base_Spine01 "
+    "CC_Base_NeckTwist01 "
+                         "CC_Base_Head CC_Base_L_Clavicle CC_Base_L_Upperarm CC_Base_L_Forearm CC_Base_L_Hand "
+                         "CC_Base_R_Clavicle "
                          "CC_Base_R_Upperarm CC_Base_R_Forearm CC_Base_R_Hand",
 }  # fmt: skip
 
@@ -299,7 +351,9 @@ def test_bvh_with_z_up_one_brace_lines_and_six_channels(tmp_path: Path) -> None:
     path.write_text(text.replace("\n{", " {").replace("ROOT Hips {", "ROOT Hips\n{"))
     plain = tmp_path / "plain.bvh"
     plain.write_text(text)
-    np.testing.assert_array_equal(load_motions(path).takes[0].frames["operator"], load_motions(plain).takes[0].frames["operator"])
+    np.testing.assert_array_equal(
+        load_motions(path).takes[0].frames["operator"], load_motions(plain).takes[0].frames["operator"]
+    )
 
 
 def test_a_person_can_say_it(tmp_path: Path) -> None:
@@ -323,8 +377,10 @@ def test_a_person_can_say_it(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("said", "message"),
     [
-        ({"joints": {"LeftElbow": "x"}}, "'LeftElbow' is unknown; did you mean 'LElbow'"), ({"joints": {"LShoulder": None}}, "needs a name, a number"),
-        ({"unit": "furlong"}, "unit: expected one of"), ({"up": "sideways"}, "up: expected an axis"), ({"person": 0}, "person must be"),
+        ({"joints": {"LeftElbow": "x"}}, "'LeftElbow' is unknown; did you mean 'LElbow'"),
+        ({"joints": {"LShoulder": None}}, "needs a name, a number"),
+        ({"unit": "furlong"}, "unit: expected one of"), ({"up": "sideways"}, "up: expected an axis"), ({"person": 0},
+        "person must be"),
     ],
 )  # fmt: skip
 def test_nonsense_that_a_person_says(tmp_path: Path, said: dict[str, object], message: str) -> None:
@@ -336,7 +392,11 @@ def test_nonsense_that_a_person_says(tmp_path: Path, said: dict[str, object], me
 def test_left_handed_axes_are_doubted_and_can_be_said(tmp_path: Path) -> None:
     joints = _person(UNITY)
     names = [f"{name}.{axis}" for name in [*NAMED, "LToe", "RToe"] for axis in "xyz"]
-    path = _csv(tmp_path / "unity.csv", [["time", *names]], np.concatenate([TIME, _flat(joints, [*NAMED, "LToe", "RToe"])], axis=1))
+    path = _csv(
+        tmp_path / "unity.csv",
+        [["time", *names]],
+        np.concatenate([TIME, _flat(joints, [*NAMED, "LToe", "RToe"])], axis=1),
+    )
     with pytest.warns(MotionWarning, match="point backward: left and right seem swapped, or an axis mirrored"):
         load_motions(path)
     (tmp_path / "unity.yaml").write_text("left_handed: true\n")
@@ -364,8 +424,12 @@ def test_points_that_make_no_person_list_what_was_tried(tmp_path: Path) -> None:
 
 def test_named_joints_that_are_no_limbs_are_refused(tmp_path: Path) -> None:
     joints = {name: np.random.default_rng(i).normal(size=(COUNT, 3)) for i, name in enumerate(NAMED)}
-    path = _csv(tmp_path / "noise.csv", [["t", *[f"{n}_{a}" for n in NAMED for a in "xyz"]]], np.concatenate([TIME, _flat(joints, NAMED)], axis=1))
-    with pytest.raises(MotionError, match="no person's arms: .* changes its length by"):
+    path = _csv(
+        tmp_path / "noise.csv",
+        [["t", *[f"{n}_{a}" for n in NAMED for a in "xyz"]]],
+        np.concatenate([TIME, _flat(joints, NAMED)], axis=1),
+    )
+    with pytest.raises(MotionError, match=r"no person's arms: .* changes its length by"):
         load_motions(path)
 
 
@@ -387,7 +451,8 @@ def test_ntu_with_two_bodies(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "step", "fps"),
-    [("time", 1 / 30, 30), ("timestamp", 33.3, 30), ("timestamp", 33_333.0, 30), ("timestamp", 333_333.0, 30), ("timestamp", 3.3333e7, 30),
+    [("time", 1 / 30, 30), ("timestamp", 33.3, 30), ("timestamp", 33_333.0, 30), ("timestamp", 333_333.0, 30),
+    ("timestamp", 3.3333e7, 30),
      ("timestamp_us", 16_667.0, 60), ("timestamp_ms", 1 / 30, 30), ("timestamp", 41_667.0, 24)],
 )  # fmt: skip
 def test_the_unit_of_time_is_found_by_the_rate(tmp_path: Path, name: str, step: float, fps: float) -> None:
@@ -401,6 +466,9 @@ def test_times_that_may_be_ten_times_wrong_are_said_aloud(tmp_path: Path) -> Non
     names = [f"{joint}_{axis}" for joint in NAMED for axis in "xyz"]
     table = np.concatenate([100_000.0 * np.arange(COUNT)[:, None], _flat(_person(), NAMED)], axis=1)
     path = _csv(tmp_path / "clock.csv", [["timestamp", *names]], table)
-    with pytest.warns(MotionWarning, match=r"give 100 frames per second, .* 10; the first was taken, --fps|give 10 frames per second, .* 100"):
+    with pytest.warns(
+        MotionWarning,
+        match=r"give 100 frames per second, .* 10; the first was taken, --fps|give 10 frames per second, .* 100",
+    ):
         load_motions(path)
     assert load_motions(path, fps=10.0).takes[0].timestamps is None

@@ -94,17 +94,22 @@ def _tree(file: Path, lines: list[str], cursor: int) -> tuple[list[Joint], int]:
             place, word = f"{file}, line {number + 1}", words[0].upper()
             if (opened is not None) != (part == "{"):
                 raise MotionError(
-                    f"{place}: expected {'{' if opened is not None else 'a joint, OFFSET, CHANNELS or }'}, got {part[:60]!r}"
+                    f"{place}: expected {'{' if opened is not None else 'a joint, OFFSET, CHANNELS or }'}, got "
+                    f"{part[:60]!r}"
                 )
             if part == "{" and opened is not None:
                 stack.append(opened)
                 opened = None
                 if len(stack) > BUDGET.depth:
-                    raise MotionError(f"{place}: more than {BUDGET.depth} joints hang below one another; that is no person")
+                    raise MotionError(
+                        f"{place}: more than {BUDGET.depth} joints hang below one another; that is no person"
+                    )
             elif word in ("ROOT", "JOINT"):
                 name = part[len(word) :].strip()
                 if not name or (word == "ROOT") != (not stack) or (word == "ROOT" and joints) or stack[-1:] == [-1]:
-                    raise MotionError(f"{place}: expected one ROOT, then JOINT with a name inside it; got {part[:60]!r}")
+                    raise MotionError(
+                        f"{place}: expected one ROOT, then JOINT with a name inside it; got {part[:60]!r}"
+                    )
                 if len(joints) >= _MAX_JOINTS:
                     raise MotionError(f"{file}: more than {_MAX_JOINTS} joints; at most {_MAX_JOINTS} are read")
                 joints.append(Joint(name, stack[-1] if stack else -1, np.zeros(3), first=column, line=number + 1))
@@ -128,7 +133,8 @@ def _tree(file: Path, lines: list[str], cursor: int) -> tuple[list[Joint], int]:
             elif word == "MOTION":
                 if stack or not joints:
                     raise MotionError(
-                        f"{place}: MOTION comes too early, {f'{len(stack)} braces are open' if joints else 'there is no joint'}"
+                        f"{place}: MOTION comes too early, "
+                        f"{f'{len(stack)} braces are open' if joints else 'there is no joint'}"
                     )
                 return joints, number + 1
             else:
@@ -162,7 +168,8 @@ def _channels(place: str, words: list[str]) -> list[tuple[int, bool]]:
     found = [("xyz".index(match.group(1).lower()), match.group(2).lower() == "rotation") for match in matches if match]
     if len(words) < 2 or words[1] != str(len(words) - 2) or len(found) != len(matches) or len(set(found)) != len(found):
         raise MotionError(
-            f"{place}: expected CHANNELS, their number, and as many of Xposition to Zposition and Xrotation to Zrotation (CHANNELS 3 "
+            f"{place}: expected CHANNELS, their number, and as many of Xposition to Zposition and Xrotation to "
+            f"Zrotation (CHANNELS 3 "
             f"with three rotations is usual); got {' '.join(words)[:90]!r}"
         )
     return found
@@ -230,7 +237,9 @@ def _slow(file: Path, lines: list[str], rows: list[int], channels: int, frames: 
             end = "; the file is truncated" if row == len(rows) - 1 else ""
             if row >= frames and row == len(rows) - 1:
                 return table[:row]
-            raise MotionError(f"{file}, line {number + 1}: {len(words)} numbers, the hierarchy has {channels} channels{end}")
+            raise MotionError(
+                f"{file}, line {number + 1}: {len(words)} numbers, the hierarchy has {channels} channels{end}"
+            )
         table[row] = numbers(words, file, number + 1)
     return table
 

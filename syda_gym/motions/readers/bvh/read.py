@@ -75,14 +75,17 @@ def _matched(file: Path, hierarchy: Hierarchy, names: list[str], said: Said) -> 
     matched.setdefault("Pelvis", 0)
     for joint, name in said.joints.items():
         if name not in names:
-            raise MotionError(f"{file} has no joint {name!r} for {joint}; {nearest_name(name, [n[:60] for n in names])}")
+            raise MotionError(
+                f"{file} has no joint {name!r} for {joint}; {nearest_name(name, [n[:60] for n in names])}"
+            )
         matched[joint] = names.index(name)
     counts = Counter(names)
     for joint, index in matched.items():
         if joint[1:] in _ARM_PARTS and counts[names[index]] > 1:
             lines = ", ".join(str(one.line) for one in hierarchy.joints if one.name == names[index])
             raise MotionError(
-                f"{file}: joint {names[index]!r} occurs {counts[names[index]]} times (lines {lines[:60]}); an arm's names must be "
+                f"{file}: joint {names[index]!r} occurs {counts[names[index]]} times (lines {lines[:60]}); an arm's "
+                f"names must be "
                 "distinct"
             )
     return matched

@@ -68,7 +68,10 @@ def read_bag(path: str | Path, said: Said = NOTHING_SAID) -> Motions:
     if recording is None:
         topics = ", ".join(str(topic) for topic in found["topics"] if topic) or "no topic"
         frames = ", ".join(str(name) for name in found["frames"][:12] if name)
-        raise MotionError(f"{file}: nobody is in it: no frames of tf or markers make an arm; it has {topics}; frames: {frames or 'none'}")
+        raise MotionError(
+            f"{file}: nobody is in it: no frames of tf or markers make an arm; it has {topics}; frames: "
+            f"{frames or 'none'}"
+        )
     return motions_from(recording, said)
 
 
@@ -78,7 +81,9 @@ def _from_transforms(file: Path, found: dict[str, NDArray[Any]], said: Said) -> 
     for index, name in enumerate(names):
         who, joint = _who(name)
         people.setdefault(who, {})[joint] = index
-    whole = {who: joints for who, joints in people.items() if _has_arm(joint_points(list(joints))) or _said_arm(said, names)}
+    whole = {
+        who: joints for who, joints in people.items() if _has_arm(joint_points(list(joints))) or _said_arm(said, names)
+    }
     if not whole:
         return None
     number, notes = chosen(file, list(whole), said)
@@ -178,7 +183,9 @@ def _from_markers(file: Path, found: dict[str, NDArray[Any]], said: Said) -> Rec
         who, point = np.zeros(len(rows), dtype=np.int64), rows[:, 1].astype(np.int64)
     else:
         number = rows[:, 2].astype(np.int64)
-        who, point = (number // _PER_BODY, number % _PER_BODY) if number.max() >= _PER_BODY else (np.zeros_like(number), number)
+        who, point = (
+            (number // _PER_BODY, number % _PER_BODY) if number.max() >= _PER_BODY else (np.zeros_like(number), number)
+        )
     people = [int(one) for one in dict.fromkeys(who.tolist())]
     index, notes = chosen(file, [f"body {one}" for one in people], said)
     rows, point = rows[who == people[index]], point[who == people[index]]
@@ -198,6 +205,7 @@ def _from_markers(file: Path, found: dict[str, NDArray[Any]], said: Said) -> Rec
         return Recording(file, "bag", joints, stamps=stamps, up=(0.0, 0.0, 1.0), unit=1.0, names=spaces, notes=notes)
     best, doubt = best_way(file, by_points(points, said), f"markers of {count} points")
     return Recording(
-        file, "bag", best.joints, stamps=stamps, up=best.layout.up, unit=1.0, notes=[*notes, f"markers read as {best.label}"],
+        file, "bag", best.joints, stamps=stamps, up=best.layout.up, unit=1.0, notes=[*notes, f"markers read as "
+        f"{best.label}"],
         doubts=[doubt] if doubt else [],
     )  # fmt: skip

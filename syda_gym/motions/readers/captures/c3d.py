@@ -61,10 +61,15 @@ def read_c3d(path: str | Path, said: Said = NOTHING_SAID) -> Motions:
     joints = {joint: points[:, indices].mean(axis=1) for joint, indices in places.items()}
     rate = float(np.ravel(found["rate"])[0])
     unit = UNITS.get(str(found["units"][0]).strip().lower())
-    used = ", ".join(f"{joint} = {'+'.join(labels[i] for i in places[joint])}" for joint in joints if joint[1:] in ("Shoulder", "Elbow", "Hand"))
+    used = ", ".join(
+        f"{joint} = {'+'.join(labels[i] for i in places[joint])}"
+        for joint in joints
+        if joint[1:] in ("Shoulder", "Elbow", "Hand")
+    )
     return motions_from(
         Recording(
-            file, "c3d", joints, fps=rate if 0.1 <= rate <= 1_500.0 else None, up=(0.0, 0.0, 1.0), unit=unit, names=listed,
+            file, "c3d", joints, fps=rate if 0.1 <= rate <= 1_500.0 else None, up=(0.0, 0.0, 1.0), unit=unit,
+            names=listed,
             notes=[*notes, f"joints: {used}"],
         ),
         said,

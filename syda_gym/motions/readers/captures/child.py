@@ -1,7 +1,7 @@
 """Opening files with libraries that a damaged file can crash or hang: in a process of its own, with limits.
 
-``ezc3d`` is C++ and ends its process on some damaged files; bags unpack what they hold. The child writes plain arrays to a
-file, which is read as any stranger's file is.
+``ezc3d`` is C++ and ends its process on some damaged files; bags unpack what they hold. The child writes plain arrays
+to a file, which is read as any stranger's file is.
 """
 
 from __future__ import annotations
@@ -52,6 +52,12 @@ def arrays_from_child(script: str, path: Path, feature: str, extra: str) -> dict
         if done.returncode == _MISSING:
             raise MissingExtraError(feature, extra)
         if done.returncode != 0 or not out.is_file():
-            reason = done.stderr.decode("utf-8", "replace").strip().splitlines()[-1:] if done.returncode == _REFUSED else []
-            raise MotionError(f"{path} is damaged or too large: {reason[0][:300] if reason else 'the library that opens it failed'}")
-        return {name: np.asarray(value) for name, value in read_arrays(out, "what was found in it", MotionError).items()}
+            reason = (
+                done.stderr.decode("utf-8", "replace").strip().splitlines()[-1:] if done.returncode == _REFUSED else []
+            )
+            raise MotionError(
+                f"{path} is damaged or too large: {reason[0][:300] if reason else 'the library that opens it failed'}"
+            )
+        return {
+            name: np.asarray(value) for name, value in read_arrays(out, "what was found in it", MotionError).items()
+        }

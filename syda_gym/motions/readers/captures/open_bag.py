@@ -1,4 +1,4 @@
-"""A script, run in a process of its own: transforms and markers of a ROS bag as arrays (``open_bag.py BAG OUT.npz``)."""
+"""A script, run in a process of its own: transforms and markers of a ROS bag as arrays (``open_bag.py BAG OUT``)."""
 
 import sys
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 __all__: list[str] = []
 
 _MOST = 4_000_000  # transforms and points
+_READ = ("TFMessage", "tfMessage", "MarkerArray", "Marker")
 
 
 def _limit() -> None:
@@ -46,17 +47,17 @@ def _main(path: str, out: str) -> int:
     topics: set[str] = set()
     try:
         with AnyReader([Path(path)], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            kinds = {connection: connection.msgtype.rpartition("/")[2] for connection in reader.connections}
             topics = {f"{c.topic} ({c.msgtype})" for c in reader.connections}
-            wanted = [c for c, kind in kinds.items() if kind in ("TFMessage", "tfMessage", "MarkerArray", "Marker")]
+            wanted = [c for c in reader.connections if c.msgtype.rpartition("/")[2] in _READ]
             for connection, logged, raw in reader.messages(connections=wanted):
                 message: Any = reader.deserialize(raw, connection.msgtype)
-                if kinds[connection] in ("TFMessage", "tfMessage"):
+                if connection.msgtype.endswith("/TFMessage") or connection.msgtype.endswith("/tfMessage"):
                     fixed = float(connection.topic.endswith("tf_static"))
                     for one in message.transforms:
                         move, turn = one.transform.translation, one.transform.rotation
                         transforms.append((
-                            _seconds(one.header.stamp, logged), _name(frames, one.child_frame_id), _name(frames, one.header.frame_id),
+                            _seconds(one.header.stamp, logged), _name(frames, one.child_frame_id), _name(frames,
+                            one.header.frame_id),
                             move.x, move.y, move.z, turn.x, turn.y, turn.z, turn.w, fixed,
                         ))  # fmt: skip
                 else:
@@ -75,7 +76,8 @@ def _main(path: str, out: str) -> int:
         np.savez(
             out, frames=np.array([*frames, ""], dtype="U100"), spaces=np.array([*spaces, ""], dtype="U100"),
             transforms=np.array(transforms, dtype=np.float64).reshape(-1, 11),
-            markers=np.array(markers, dtype=np.float64).reshape(-1, 7), topics=np.array([*sorted(topics)[:30], ""], dtype="U200"),
+            markers=np.array(markers, dtype=np.float64).reshape(-1, 7), topics=np.array([*sorted(topics)[:30], ""],
+            dtype="U200"),
         )  # fmt: skip
     except Exception as error:  # whatever the library raises is said in one line
         print(str(error).splitlines()[0] if str(error) else type(error).__name__, file=sys.stderr)

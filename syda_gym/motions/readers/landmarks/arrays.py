@@ -1,7 +1,7 @@
 """Arrays of points, saved by numpy: ``.npy``, or ``.npz`` under whatever key.
 
-``(T, P, 3)`` with P points, or with a fourth number for confidence; ``(T, people, P, 3)``; ``(T, 3 P)``; ``(T, 3, P)``. Which order
-the points have is found by their number and by which order makes a person.
+``(T, P, 3)`` with P points, or with a fourth number for confidence; ``(T, people, P, 3)``; ``(T, 3 P)``; ``(T, 3,
+P)``. Which order the points have is found by their number and by which order makes a person.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ __all__ = ["is_arrays", "read_arrays_of_points"]
 
 _TIMES = ("timestamps", "timestamp", "times", "time", "t")
 _RATES = ("fps", "frame_rate", "framerate", "rate", "mocap_framerate", "mocap_frame_rate")
-_LIKELY = ("pose_world_landmarks", "world_landmarks", "landmarks", "keypoints_3d", "keypoints3d", "joints3d", "joints", "positions",
+_LIKELY = ("pose_world_landmarks", "world_landmarks", "landmarks", "keypoints_3d", "keypoints3d", "joints3d",
+"joints", "positions",
            "jtr", "Jtr", "poses_3d", "positions_3d", "keypoints")  # fmt: skip
 _ANGLES = {"poses", "pose_body", "global_orient", "body_pose", "root_orient", "betas", "trans"}  # AMASS and SMPL
 _COUNTS = {len(layout.joints) for layout in LAYOUTS}
@@ -71,7 +72,9 @@ def read_arrays_of_points(path: str | Path, said: Said = NOTHING_SAID, format: s
     arrays = read_arrays(file, "arrays of points (.npy or .npz)", MotionError)
     key, points, sure, notes = _points(file, arrays, said)
     if points.size > BUDGET.elements:
-        raise MotionError(f"{file}: {key or 'the array'} holds {points.size} numbers; at most {BUDGET.elements} are read. Cut it")
+        raise MotionError(
+            f"{file}: {key or 'the array'} holds {points.size} numbers; at most {BUDGET.elements} are read. Cut it"
+        )
     if not said.joints and not said.order and np.isinf(points).any():
         frame = int(np.flatnonzero(np.isinf(points).any(axis=(1, 2)))[0])
         raise MotionError(f"{file}, frame {frame}: a coordinate is infinite")
@@ -82,7 +85,8 @@ def read_arrays_of_points(path: str | Path, said: Said = NOTHING_SAID, format: s
     best, doubt = best_way(file, ways, f"{points.shape[1]} points a frame in {key or 'the array'}")
     return motions_from(
         Recording(
-            file, best.layout.format, best.joints, fps=_rate(file, arrays), stamps=_stamps(file, arrays, len(points), said),
+            file, best.layout.format, best.joints, fps=_rate(file, arrays), stamps=_stamps(file, arrays, len(points),
+            said),
             up=best.layout.up, names=[name for name in best.layout.joints if name != "-"],
             notes=[*notes, f"read as {best.label}" + (f" from {key}" if key else "")], doubts=[doubt] if doubt else [],
             image=best.layout.image,
@@ -95,7 +99,9 @@ def _points(
     file: Path, arrays: Mapping[str, NDArray[Any]], said: Said
 ) -> tuple[str, FloatArray, FloatArray | None, list[str]]:
     """Key, points ``(T, P, 3)``, certainty ``(T, P)`` if there is one, and notes."""
-    listed = ", ".join(f"{name or 'array'} {value.shape} {value.dtype}"[:80] for name, value in list(arrays.items())[:12])
+    listed = ", ".join(
+        f"{name or 'array'} {value.shape} {value.dtype}"[:80] for name, value in list(arrays.items())[:12]
+    )
     order = [name for name in _LIKELY if name in arrays]
     if len(_ANGLES & set(arrays)) < 2:
         order += [name for name in arrays if name not in order]
@@ -114,10 +120,13 @@ def _points(
             return name, table[:, :, :3], None, notes
     if _ANGLES & set(arrays):
         raise MotionError(
-            f"{file} holds the angles of an SMPL body, as AMASS publishes them ({listed}), not where its joints are; compute the joints "
+            f"{file} holds the angles of an SMPL body, as AMASS publishes them ({listed}), not where its joints are; "
+            f"compute the joints "
             "with the body model and save them as an array (T, 22, 3)"
         )
-    raise MotionError(f"{file}: expected an array (frames, points, 3) or (frames, points, 4), got {listed or 'nothing'}")
+    raise MotionError(
+        f"{file}: expected an array (frames, points, 3) or (frames, points, 4), got {listed or 'nothing'}"
+    )
 
 
 def _shaped(file: Path, value: NDArray[Any], said: Said) -> tuple[NDArray[Any], list[str]] | None:

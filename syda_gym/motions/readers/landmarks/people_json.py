@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,24 +16,55 @@ from syda_gym.files import shortened
 
 __all__ = ["Person", "frames_of", "people_of", "time_of"]
 
-_FRAMES = ("frames", "data", "instance_info", "results", "annotations", "poses", "sequence", "body_frames", "bodyFrames", "Frames",
+_FRAMES = ("frames", "data", "instance_info", "results", "annotations", "poses", "sequence", "body_frames",
+"bodyFrames", "Frames",
            "samples", "skeletonFrames")  # fmt: skip
-_PEOPLE = ("bodies", "people", "persons", "instances", "skeletons", "Bodies", "Skeletons", "users", "tracked_bodies", "predictions")
-_WORLD = ("pose_world_landmarks", "poseWorldLandmarks", "world_landmarks", "worldLandmarks", "landmarks_world", "keypoints3D",
-          "keypoints_3d", "keypoints3d", "pose_keypoints_3d", "joints_3d", "joints3d", "joint_positions", "jointPositions",
-          "pred_xyz_jts", "landmarks", "joints", "Joints", "positions", "skeleton", "keypoints", "points", "pose", "body",
+_PEOPLE = (
+    "bodies",
+    "people",
+    "persons",
+    "instances",
+    "skeletons",
+    "Bodies",
+    "Skeletons",
+    "users",
+    "tracked_bodies",
+    "predictions",
+)
+_WORLD = ("pose_world_landmarks", "poseWorldLandmarks", "world_landmarks", "worldLandmarks", "landmarks_world",
+"keypoints3D",
+          "keypoints_3d", "keypoints3d", "pose_keypoints_3d", "joints_3d", "joints3d", "joint_positions",
+          "jointPositions",
+          "pred_xyz_jts", "landmarks", "joints", "Joints", "positions", "skeleton", "keypoints", "points", "pose",
+          "body",
           "keypoint", "landmark", "JointPositions")  # fmt: skip
 _IMAGE = ("pose_landmarks", "poseLandmarks", "pose_keypoints_2d", "keypoints_2d", "keypoints2D")
-_SURE = ("visibility", "score", "confidence", "tracking_state", "trackingState", "TrackingState", "confidence_level", "likelihood",
+_SURE = ("visibility", "score", "confidence", "tracking_state", "trackingState", "TrackingState", "confidence_level",
+"likelihood",
          "keypoint_scores", "joint_confidences", "Confidence")  # fmt: skip
 _NESTED = ("position", "Position", "world", "real", "location", "translation", "pos", "coordinates", "cameraSpacePoint")
 _NAMES = ("name", "part", "joint", "type", "joint_name", "JointType", "jointType", "bodyPart", "label")
-_IDS = ("body_id", "bodyId", "id", "trackingId", "tracking_id", "track_id", "person_id", "TrackingId", "user_id", "idx", "person")
+_IDS = (
+    "body_id",
+    "bodyId",
+    "id",
+    "trackingId",
+    "tracking_id",
+    "track_id",
+    "person_id",
+    "TrackingId",
+    "user_id",
+    "idx",
+    "person",
+)
 _AXES = (("x", "y", "z"), ("X", "Y", "Z"), ("cameraX", "cameraY", "cameraZ"))
 _CLOCKS = (
-    ("timestamp_ms", "ms"), ("timestampInMilliseconds", "ms"), ("time_ms", "ms"), ("timestamp_usec", "us"), ("timestampUs", "us"),
-    ("timestamp_us", "us"), ("time_us", "us"), ("device_timestamp_usec", "us"), ("timestamp_ns", "ns"), ("timestamp_s", "s"),
-    ("time_s", "s"), ("relativeTime", None), ("RelativeTime", None), ("timestamp", None), ("time", None), ("Timestamp", None),
+    ("timestamp_ms", "ms"), ("timestampInMilliseconds", "ms"), ("time_ms", "ms"), ("timestamp_usec", "us"),
+    ("timestampUs", "us"),
+    ("timestamp_us", "us"), ("time_us", "us"), ("device_timestamp_usec", "us"), ("timestamp_ns", "ns"),
+    ("timestamp_s", "s"),
+    ("time_s", "s"), ("relativeTime", None), ("RelativeTime", None), ("timestamp", None), ("time", None),
+    ("Timestamp", None),
     ("timeStamp", None), ("t", None), ("ts", None),
 )  # fmt: skip
 _STATES = {"NotTracked": 0.0, "Inferred": 1.0, "Tracked": 2.0}
@@ -66,18 +98,28 @@ def frames_of(path: Path, document: Any) -> tuple[list[Any], Mapping[str, Any]]:
         for key in _FRAMES:
             if isinstance(document.get(key), list):
                 return document[key], document
-            if isinstance(document.get(key), Mapping) and document[key] and all(str(k).isdigit() for k in document[key]):
+            if (
+                isinstance(document.get(key), Mapping)
+                and document[key]
+                and all(str(k).isdigit() for k in document[key])
+            ):
                 return [document[key][k] for k in sorted(document[key], key=lambda one: int(str(one)[:18]))], document
         if document and all(str(key).isdigit() for key in document):
             return [document[key] for key in sorted(document, key=lambda one: int(str(one)[:18]))], {}
         for key in _WORLD:
             if isinstance(document.get(key), list) and _depth(document[key]) >= 3:
                 return document[key], document
-        if document and all(isinstance(value, list) and len(value) > 1 and _depth(value) == 2 for value in document.values()):
+        if document and all(
+            isinstance(value, list) and len(value) > 1 and _depth(value) == 2 for value in document.values()
+        ):
             return _by_joint(path, document), {}
         if any(key in document for key in (*_PEOPLE, *_WORLD, *_IMAGE)):
             return [document], {}
-    came = f"an object with the keys {', '.join(map(str, list(document)[:8]))[:160]}" if isinstance(document, Mapping) else "no list"
+    came = (
+        f"an object with the keys {', '.join(map(str, list(document)[:8]))[:160]}"
+        if isinstance(document, Mapping)
+        else "no list"
+    )
     raise MotionError(f"{path}: expected a list of frames, or an object with one under 'frames'; got {came}")
 
 
@@ -121,10 +163,8 @@ def time_of(path: Path, index: int, frame: Any) -> tuple[float, str | None, str]
         if frame.get(key) is not None:
             value = frame[key]
             if isinstance(value, str):
-                try:
+                with contextlib.suppress(ValueError):
                     value = float(value)
-                except ValueError:
-                    pass
             if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e20:
                 raise MotionError(f"{path}, frame {index}: {key} is no number: {shortened(value, 60)}")
             return float(value), unit, key
@@ -135,7 +175,9 @@ def _by_joint(path: Path, document: Mapping[str, Any]) -> list[Any]:
     """Joint to its places over time becomes a list of frames."""
     lengths = {len(value) for value in document.values()}
     if len(lengths) != 1:
-        raise MotionError(f"{path}: the joints {', '.join(list(document)[:5])[:100]} have unequally many frames {sorted(lengths)[:6]}")
+        raise MotionError(
+            f"{path}: the joints {', '.join(list(document)[:5])[:100]} have unequally many frames {sorted(lengths)[:6]}"
+        )
     return [dict(zip(document, row, strict=True)) for row in zip(*document.values(), strict=True)]
 
 
@@ -149,19 +191,26 @@ def _person(where: str, body: Any, common: tuple[str, ...]) -> list[Person]:
         key = next((name for name in _WORLD if name in body and body[name] is not None), None)
         if key is None:
             if any(name in body for name in _IMAGE):
-                raise MotionError(f"{where}: only image landmarks ({', '.join(k for k in _IMAGE if k in body)}), whose depth is unknown; "
+                raise MotionError(f"{where}: only image landmarks ({', '.join(k for k in _IMAGE if k in body)}), "
+                f"whose depth is unknown; "
                                   "dump pose_world_landmarks instead")  # fmt: skip
             if not _is_named(body):
                 if any(name in body for name in _WORLD):
                     return []
                 keys = ", ".join(map(str, list(body)[:8]))[:120]
-                raise MotionError(f"{where}: expected a key 'pose_world_landmarks' (or keypoints3D, joints, bodies and the like), got {keys}")
-            points = body
+                raise MotionError(
+                    f"{where}: expected a key 'pose_world_landmarks' (or keypoints3D, joints, bodies and the like), "
+                    f"got {keys}"
+                )
+            points: Any = body
         else:
             points = body[key]
             sure = next((body[name] for name in _SURE if isinstance(body.get(name), list)), None)
             if sure is not None and isinstance(points, list) and len(sure) == len(points):
-                points = [[*point[:3], value] if isinstance(point, list) else point for point, value in zip(points, sure, strict=True)]
+                points = [
+                    [*point[:3], value] if isinstance(point, list) else point
+                    for point, value in zip(points, sure, strict=True)
+                ]
             if isinstance(points, Mapping) and isinstance(points.get("landmark"), list):
                 points = points["landmark"]
             if _is_group(points):
@@ -182,7 +231,9 @@ def _points(where: str, points: Any) -> tuple[tuple[str, ...], FloatArray]:
             raise MotionError(f"{where}: expected points with x, y and z, got {shortened(points, 100)}")
         if len(kept) > _MOST_POINTS:
             raise MotionError(f"{where}: {len(kept)} points; at most {_MOST_POINTS} are read")
-        return tuple(name[:100] for name in kept), np.array([_point(where, name, value) for name, value in kept.items()])
+        return tuple(name[:100] for name in kept), np.array(
+            [_point(where, name, value) for name, value in kept.items()]
+        )
     if not isinstance(points, list):
         raise MotionError(f"{where}: expected landmarks, got {type(points).__name__}")
     if len(points) > 4 * _MOST_POINTS:
@@ -190,7 +241,8 @@ def _points(where: str, points: Any) -> tuple[tuple[str, ...], FloatArray]:
     if all(isinstance(value, int | float) or value is None for value in points):
         return (), _flat(where, points)
     table = np.array([_point(where, number, value) for number, value in enumerate(points)])
-    names = [next((value[key] for key in _NAMES if isinstance(value.get(key), str)), None) if isinstance(value, Mapping) else None
+    names = [next((value[key] for key in _NAMES if isinstance(value.get(key), str)), None) if isinstance(value,
+    Mapping) else None
              for value in points]  # fmt: skip
     return (tuple(str(name)[:100] for name in names) if all(names) and len(set(names)) == len(names) else ()), table
 
@@ -199,7 +251,9 @@ def _flat(where: str, values: list[Any]) -> FloatArray:
     """Numbers one after the other: x, y, z or x, y, z and certainty."""
     for width in (4, 3):
         if len(values) % width == 0 and len(values) // width >= 5:
-            table = np.array([_point(where, i, values[width * i : width * (i + 1)]) for i in range(len(values) // width)])
+            table = np.array(
+                [_point(where, i, values[width * i : width * (i + 1)]) for i in range(len(values) // width)]
+            )
             if width == 3 or ((table[:, 3] >= 0.0) & (table[:, 3] <= 1.0) | np.isnan(table[:, 3])).all():
                 return table
     raise MotionError(f"{where}: {len(values)} numbers, which are neither points of 3 nor of 4; expected landmarks")
@@ -216,13 +270,16 @@ def _point(where: str, number: object, value: Any) -> list[float]:
             axes = next((axes for axes in _AXES if all(axis in inner for axis in axes)), None)
             found = [inner[axis] for axis in axes] if axes else []
             if not found and {"x", "y"} <= set(inner):
-                raise MotionError(f"{where}, landmark {number}: x and y only: a place in a picture, whose depth is unknown")
+                raise MotionError(
+                    f"{where}, landmark {number}: x and y only: a place in a picture, whose depth is unknown"
+                )
         else:
             found = list(inner[:3])
     elif isinstance(value, list):
         if len(value) == 2 and all(isinstance(one, int | float) for one in value):
             raise MotionError(
-                f"{where}, landmark {number}: expected x, y, z, got two numbers: a place in a picture, whose depth is unknown"
+                f"{where}, landmark {number}: expected x, y, z, got two numbers: a place in a picture, whose depth "
+                f"is unknown"
             )
         found = value[:3]
         sure = value[3] if len(value) in (4, 5) else None
@@ -230,15 +287,23 @@ def _point(where: str, number: object, value: Any) -> list[float]:
         sure = _STATES.get(sure)
     numbers = [*found, float("nan") if sure is None else sure]
     numbers = [float("nan") if one is None else one for one in numbers]
-    if len(found) != 3 or any(isinstance(one, bool) or not isinstance(one, int | float) or abs(one) >= 1e9 for one in numbers):
-        raise MotionError(f"{where}, landmark {number}: expected x, y, z and visibility as numbers, got {shortened(value, 80)}")
+    if len(found) != 3 or any(
+        isinstance(one, bool) or not isinstance(one, int | float) or abs(one) >= 1e9 for one in numbers
+    ):
+        raise MotionError(
+            f"{where}, landmark {number}: expected x, y, z and visibility as numbers, got {shortened(value, 80)}"
+        )
     return [float(one) for one in numbers]
 
 
 def _is_point(value: Any) -> bool:
     if isinstance(value, Mapping):
         return any(all(axis in value for axis in axes) for axes in _AXES) or any(key in value for key in _NESTED)
-    return isinstance(value, list) and 3 <= len(value) <= 5 and all(isinstance(one, int | float) or one is None for one in value)
+    return (
+        isinstance(value, list)
+        and 3 <= len(value) <= 5
+        and all(isinstance(one, int | float) or one is None for one in value)
+    )
 
 
 def _is_named(body: Mapping[str, Any]) -> bool:

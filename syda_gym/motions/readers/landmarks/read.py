@@ -1,7 +1,7 @@
-"""Reading landmarks from JSON: MediaPipe, TF.js, Azure Kinect's offline processor, Kinect, OpenPose, MMPose, ZED, Nuitrack.
+"""Reading landmarks from JSON: MediaPipe, TF.js, Azure Kinect, Kinect, OpenPose, MMPose, ZED, Nuitrack and the like.
 
-A frame holds people, a person holds points, a point has x, y, z; how they are nested is found by looking. Only places in
-space can be used; places in a picture have no depth and are refused.
+A frame holds people, a person holds points, a point has x, y, z; how they are nested is found by looking. Only places
+in space can be used; places in a picture have no depth and are refused.
 https://ai.google.dev/edge/mediapipe/solutions/vision/pose_landmarker
 """
 
@@ -76,22 +76,32 @@ def landmark_recording(file: Path, data: bytes, said: Said, format: str | None =
     if not frames:
         raise MotionError(f"{file} has no frames")
     if len(frames) == 1 and isinstance(frames[0], Mapping) and "people" in frames[0]:
-        raise MotionError(f"{file} holds one frame, as OpenPose writes one file a frame; join them into a list of frames first")
+        raise MotionError(
+            f"{file} holds one frame, as OpenPose writes one file a frame; join them into a list of frames first"
+        )
     named = about.get("joint_names")
-    common = tuple(str(name)[:100] for name in named) if isinstance(named, list) and all(isinstance(n, str) for n in named) else ()
+    common = (
+        tuple(str(name)[:100] for name in named)
+        if isinstance(named, list) and all(isinstance(n, str) for n in named)
+        else ()
+    )
     seen = [people_of(file, index, frame, common) for index, frame in enumerate(frames)]
     _check_amount(file, seen)
     people, notes = _one(file, seen, said)
     stamps = _stamps(file, frames)
     sizes = Counter(len(person.points) for person in people if person is not None)
     if not sizes:
-        raise MotionError(f"{file}: nobody is in any of the {len(frames)} frames; a shoulder is tracked in 0 % of the frames")
+        raise MotionError(
+            f"{file}: nobody is in any of the {len(frames)} frames; a shoulder is tracked in 0 % of the frames"
+        )
     count = sizes.most_common(1)[0][0]
     table = np.full((len(frames), count, 4), np.nan)
     for index, person in enumerate(people):
         if person is not None:
             if len(person.points) != count:
-                raise MotionError(f"{file}, frame {index}: expected {count} landmarks as in other frames, got {len(person.points)}")
+                raise MotionError(
+                    f"{file}, frame {index}: expected {count} landmarks as in other frames, got {len(person.points)}"
+                )
             table[index] = person.points
     names = next((person.names for person in people if person is not None), ())
     recording = _recording(file, table, names, said, format)
@@ -109,18 +119,26 @@ def _recording(file: Path, table: FloatArray, names: tuple[str, ...], said: Said
         elif place.isdigit() and int(place) < points.shape[1]:
             matched[joint] = (int(place),)
         else:
-            raise MotionError(f"{file} has no point {place!r} for {joint}; it has {', '.join(names[:20]) or f'{points.shape[1]} points'}")
+            raise MotionError(
+                f"{file} has no point {place!r} for {joint}; it has "
+                f"{', '.join(names[:20]) or f'{points.shape[1]} points'}"
+            )
     if {"LShoulder", "LElbow", "LHand"} <= set(matched) or {"RShoulder", "RElbow", "RHand"} <= set(matched):
         joints = {joint: points[:, list(indices)].mean(axis=1) for joint, indices in matched.items()}
-        kind = format or ("azure" if points.shape[1] == 32 and names else "mediapipe" if points.shape[1] == 33 else "keypoints")
+        kind = format or (
+            "azure" if points.shape[1] == 32 and names else "mediapipe" if points.shape[1] == 33 else "keypoints"
+        )
         return Recording(file, kind, joints, up=(0.0, -1.0, 0.0), names=names, image=kind != "azure")
     ways = by_points(points, said, format)
     if not ways and format is None:
         known = ", ".join(sorted({str(len(layout.joints)) for layout in LAYOUTS}, key=int))
-        raise MotionError(f"{file}, frame 0: expected 33 landmarks of MediaPipe or one of {known} points, got {points.shape[1]}")
+        raise MotionError(
+            f"{file}, frame 0: expected 33 landmarks of MediaPipe or one of {known} points, got {points.shape[1]}"
+        )
     best, doubt = best_way(file, ways, f"{points.shape[1]} points a frame")
     return Recording(
-        file, best.layout.format, best.joints, up=best.layout.up, names=names or ("left_shoulder", "left_elbow", "left_wrist"),
+        file, best.layout.format, best.joints, up=best.layout.up, names=names or ("left_shoulder", "left_elbow",
+        "left_wrist"),
         notes=[f"read as {best.label}"], doubts=[doubt] if doubt else [], image=best.layout.image,
     )  # fmt: skip
 
@@ -147,7 +165,9 @@ def _each_line(file: Path, lines: list[bytes]) -> list[Any] | None:
         except (ValueError, RecursionError) as error:
             if len(values) < 2:
                 return None
-            raise MotionError(f"{file}, line {number}: no valid JSON: {str(error)[:120]}; is the file truncated?") from error
+            raise MotionError(
+                f"{file}, line {number}: no valid JSON: {str(error)[:120]}; is the file truncated?"
+            ) from error
     return values
 
 
@@ -161,7 +181,9 @@ def _one(file: Path, seen: list[list[Person]], said: Said) -> tuple[list[Person 
     told = all(person.identity is not None for people in seen for person in people)
     labels = list(
         dict.fromkeys(
-            (person.identity or "") if told else f"place {place + 1}" for people in seen for place, person in enumerate(people)
+            (person.identity or "") if told else f"place {place + 1}"
+            for people in seen
+            for place, person in enumerate(people)
         )
     )
     if not labels:

@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.errors import EmbodimentError, MotionError
-from syda_gym.files import atomic_path
+from syda_gym.files import BUDGET, atomic_path, read_arrays, shortened
 from syda_gym.motions.clip import Motions, Take
 
 __all__ = ["FORMAT", "MAX_BYTES", "body_from_spec", "body_spec", "read_npz", "save_motions"]
 
 FORMAT = "syda-gym motions 1"
-MAX_BYTES = 1 << 30
+MAX_BYTES = BUDGET.unpacked
 """Files that unpack to more are refused."""
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # a fixed date, so that equal motions make equal files
@@ -104,7 +104,7 @@ def read_npz(path: str | os.PathLike[str]) -> Motions:
         meta = json.loads(bytes(arrays["meta"]).decode())
         if meta["format"] != FORMAT:
             raise MotionError(
-                f"{file}: format {meta['format']!r}, expected {FORMAT!r}; write it again with this version"
+                f"{file}: format {shortened(meta['format'], 60)}, expected {FORMAT!r}; write it again with this version"
             )
         bodies = {str(entry["name"]): body_from_spec(file, entry["spec"]) for entry in meta["bodies"]}
         frames = [
@@ -120,7 +120,8 @@ def read_npz(path: str | os.PathLike[str]) -> Motions:
         raise
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError, RecursionError) as error:
         raise MotionError(
-            f"{file} is no motion file of this library or is damaged ({type(error).__name__}: {error}); "
+            f"{file} is no motion file of this library or is damaged ({type(error).__name__}: "
+            f"{shortened(str(error))}); "
             "expected one written by save_motions"
         ) from error
 
@@ -258,13 +259,8 @@ def _read(file: Path) -> dict[str, NDArray[Any]]:
     if not file.is_file():
         raise MotionError(f"no motion file {file}; check the path")
     try:
-        with zipfile.ZipFile(file) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-        if size > MAX_BYTES:
-            raise MotionError(f"{file} unpacks to {size >> 20} MB; at most {MAX_BYTES >> 20} MB are read")
-        with np.load(file, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
-    except MotionError:
+        return read_arrays(file, "a file written by save_motions", MotionError, MAX_BYTES)
+    except MotionError as error:
+        if "no readable archive" in str(error):
+            raise MotionError(f"{file} is no readable .npz file; expected one written by save_motions") from error
         raise
-    except Exception as error:  # a damaged archive raises zlib, zip, value, memory and end-of-file errors alike
-        raise MotionError(f"{file} is no readable .npz file: {error}; expected one written by save_motions") from error

@@ -12,17 +12,45 @@ __all__ = ["Columns", "find_columns"]
 
 _AXES = {"x": "x", "y": "y", "z": "z", "tx": "x", "ty": "y", "tz": "z", "px": "x", "py": "y", "pz": "z", "posx": "x",
          "posy": "y", "posz": "z", "transx": "x", "transy": "y", "transz": "z"}  # fmt: skip
-_SURE = {"c", "v", "conf", "confidence", "vis", "visibility", "score", "tracked", "state", "trackingstate", "likelihood", "prob",
+_SURE = {"c", "v", "conf", "confidence", "vis", "visibility", "score", "tracked", "state", "trackingstate",
+"likelihood", "prob",
          "quality"}  # fmt: skip
 _UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "metres": 1.0, "meters": 1.0, "inches": 0.0254}
-_PLAIN = {"pos", "position", "positions", "translation", "trans", "coord", "coordinate", "coordinates", "world", "global"}
-_TURNS = {"rot", "rotation", "quat", "quaternion", "orientation", "orient", "q", "euler", "angle", "angles", "vel", "velocity", "acc",
-          "acceleration", "gyro", "mag", "normal", "force", "moment", "rx", "ry", "rz", "std", "var", "size", "depthx", "colorx"}  # fmt: skip
-_POINT = {"landmark", "landmarks", "lm", "kp", "keypoint", "keypoints", "joint", "joints", "point", "points", "pose", "j", "p", "pt",
+_PLAIN = {
+    "pos",
+    "position",
+    "positions",
+    "translation",
+    "trans",
+    "coord",
+    "coordinate",
+    "coordinates",
+    "world",
+    "global",
+}
+_TURNS = {"rot", "rotation", "quat", "quaternion", "orientation", "orient", "q", "euler", "angle", "angles", "vel",
+"velocity", "acc",
+          "acceleration", "gyro", "mag", "normal", "force", "moment", "rx", "ry", "rz", "std", "var", "size",
+          "depthx", "colorx"}  # fmt: skip
+_POINT = {"landmark", "landmarks", "lm", "kp", "keypoint", "keypoints", "joint", "joints", "point", "points", "pose",
+"j", "p", "pt",
           "world", "marker", "n", "no", "id", "body", "skeleton"}  # fmt: skip
-_PEOPLE = {"person", "personid", "bodyid", "body", "trackingid", "trackid", "userid", "user", "subject", "subjectid", "player", "playerid",
+_PEOPLE = {"person", "personid", "bodyid", "body", "trackingid", "trackid", "userid", "user", "subject", "subjectid",
+"player", "playerid",
            "skeletonid", "poseid"}  # fmt: skip
-_FRAMES = {"frame", "frames", "frameid", "frameno", "framenumber", "frameindex", "index", "idx", "nframe", "frameidx", "sample"}
+_FRAMES = {
+    "frame",
+    "frames",
+    "frameid",
+    "frameno",
+    "framenumber",
+    "frameindex",
+    "index",
+    "idx",
+    "nframe",
+    "frameidx",
+    "sample",
+}
 _WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z][a-z]*|[a-z]+|\d+")
 _LONGEST = 200
 
@@ -77,8 +105,10 @@ def find_columns(header: Sequence[str]) -> Columns:
             if axis:
                 points.setdefault(point, {}).setdefault(axis, column)
                 result.unit = result.unit or size
-            elif result.point < 0 and bare in ("landmark", "joint", "keypoint", "name", "jointname", "landmarkname", "part", "landmarkid",
-                                               "jointid", "landmarkindex", "jointtype", "bodypart", "marker", "point", "id", "type",
+            elif result.point < 0 and bare in ("landmark", "joint", "keypoint", "name", "jointname", "landmarkname",
+            "part", "landmarkid",
+                                               "jointid", "landmarkindex", "jointtype", "bodypart", "marker", "point",
+                                               "id", "type",
                                                "jointindex", "landmarkidx"):  # fmt: skip
                 result.point = column
     complete = {name: axes for name, axes in points.items() if {"x", "y", "z"} <= set(axes)}

@@ -72,7 +72,8 @@ def read_grid(path: Path, lines: list[str], said: Said) -> Grid:
     if first is None:
         sample = lines[0].strip()[:80]
         raise MotionError(
-            f"{path} has no frames: no line of numbers in its first {min(len(lines), _MOST_HEADER)} lines; it begins with {sample!r}"
+            f"{path} has no frames: no line of numbers in its first {min(len(lines), _MOST_HEADER)} lines; it begins "
+            f"with {sample!r}"
         )
     header = [cells_of(line, separator) for line in lines[:first] if line.strip() and not said.skip_lines]
     kept = [n for n in range(first, len(lines)) if lines[n].strip() and lines[n].strip().upper() not in _ENDS]
@@ -135,7 +136,9 @@ def _first_frame(lines: list[str], separator: str | None, decimal_comma: bool, s
         following = rows[place + 1] if place + 1 < len(rows) else row
         if place + 1 < len(rows) and shares[place + 1] < 0.3 and len(following) > 1:
             continue  # numbers of a header (identities, rates), with words below them
-        if shares[place] >= 0.6 or (len(following) == len(row) and abs(shares[place] - shares[min(place + 1, len(rows) - 1)]) < 0.1):
+        if shares[place] >= 0.6 or (
+            len(following) == len(row) and abs(shares[place] - shares[min(place + 1, len(rows) - 1)]) < 0.1
+        ):
             # A line of a header that has numbers (rates, dates) is shorter than the frames below it.
             if len(following) > 2 * len(row) and shares[min(place + 1, len(rows) - 1)] < 1.0:
                 continue
@@ -179,7 +182,11 @@ def _slow(
     bad: dict[int, tuple[int, str]] = {}
     for index, number in enumerate(kept):
         row = cells_of(lines[number], separator, decimal_comma)
-        if len(row) != count and not (header and len(row) == wanted) and not _padded(row, count, wanted, separator, header):
+        if (
+            len(row) != count
+            and not (header and len(row) == wanted)
+            and not _padded(row, count, wanted, separator, header)
+        ):
             end = "; is the file truncated?" if number == kept[-1] else ""
             before = f"the header has {wanted}" if header else f"the lines before have {count}"
             raise MotionError(f"{path}, line {number + 1}: {len(row)} columns, {before}{end}")
@@ -202,7 +209,13 @@ def _slow(
 
 def _padded(row: list[str], count: int, wanted: int, separator: str | None, header: list[list[str]]) -> bool:
     """Rows whose last cells are empty lose them; rows separated by blanks cannot."""
-    return separator is not None and bool(header) and len(row) <= wanted and (wanted - len(row)) % 3 == 0 and len(row) > 0.5 * wanted
+    return (
+        separator is not None
+        and bool(header)
+        and len(row) <= wanted
+        and (wanted - len(row)) % 3 == 0
+        and len(row) > 0.5 * wanted
+    )
 
 
 def _moment(cell: str) -> float | None:

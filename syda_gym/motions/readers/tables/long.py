@@ -31,7 +31,8 @@ def from_long(grid: Grid, columns: Columns, said: Said, format: str | None = Non
     key = columns.frame if columns.frame >= 0 else columns.time
     if key < 0:
         raise MotionError(
-            f"{grid.path}: one point a line, but no column counts the frames; expected one called frame or timestamp, got "
+            f"{grid.path}: one point a line, but no column counts the frames; expected one called frame or "
+            f"timestamp, got "
             f"{', '.join(grid.header[-1][:8])}"
         )
     people = grid.words.get(columns.person)
@@ -46,7 +47,9 @@ def from_long(grid: Grid, columns: Columns, said: Said, format: str | None = Non
         raise MotionError(f"{grid.path}: {len(names)} different points; at most {_MOST_POINTS} are read")
     frames, first, index = np.unique(grid.values[rows, key], return_index=True, return_inverse=True)
     if len(frames) * len(names) > 4 * len(rows) + 1000:
-        raise MotionError(f"{grid.path}: {len(names)} points in {len(frames)} frames on {len(rows)} lines; most are missing")
+        raise MotionError(
+            f"{grid.path}: {len(names)} points in {len(frames)} frames on {len(rows)} lines; most are missing"
+        )
     width = 4 if "c" in columns.axes else 3
     table = np.full((len(frames), 1 + width * len(names)), np.nan)
     numbers = {name: position for position, name in enumerate(names)}
@@ -58,7 +61,10 @@ def from_long(grid: Grid, columns: Columns, said: Said, format: str | None = Non
     numbered = all(name.isdigit() for name in names)
     order = sorted(names, key=int) if numbered else names
     points = {
-        name: dict(zip("xyzc"[:width], range(1 + width * numbers[name], 1 + width * numbers[name] + width), strict=True)) for name in order
+        name: dict(
+            zip("xyzc"[:width], range(1 + width * numbers[name], 1 + width * numbers[name] + width), strict=True)
+        )
+        for name in order
     }
     wide = Columns(
         points=points, numbered=numbered, time=0 if columns.time >= 0 else -1, time_unit=columns.time_unit,

@@ -76,7 +76,8 @@ def from_names(
         return _only_said(grid, picked, lines, said, format or "table", notes)
     points = np.stack([picked[:, [places[key][axis] for axis in "xyz"]] for _, key in wanted], axis=1)
     sure = np.stack(
-        [picked[:, places[key]["c"]] if "c" in places[key] else np.full(len(picked), np.nan) for _, key in wanted], axis=1
+        [picked[:, places[key]["c"]] if "c" in places[key] else np.full(len(picked), np.nan) for _, key in wanted],
+        axis=1,
     )
     points = np.where(lost(sure, said)[:, :, None], np.nan, points)
     needed = [places[key][axis] for _, key in wanted for axis in "xyz"]
@@ -88,20 +89,24 @@ def from_names(
             notes=[*notes, f"read as {best.label}"], doubts=[doubt] if doubt else [], image=best.layout.image,
         )  # fmt: skip
     matched = joint_points(names)
-    matched |= {joint: (_said_point(grid, joint, place, names),) for joint, place in said.joints.items() if not _triple(place)}
+    matched |= {
+        joint: (_said_point(grid, joint, place, names),) for joint, place in said.joints.items() if not _triple(place)
+    }
     kind = format or _kind(names, any("c" in axes for axes in places.values()))
     joints = {joint: points[:, list(indices)].mean(axis=1) for joint, indices in matched.items()}
     joints |= _said_columns(grid, picked, said)
     if not joints:
         raise MotionError(
-            f"{grid.path}: no joint is named; the columns name {', '.join(names[:8]) or 'nothing'}. Say which is which: --joints "
+            f"{grid.path}: no joint is named; the columns name {', '.join(names[:8]) or 'nothing'}. Say which is "
+            f"which: --joints "
             "LShoulder=NAME"
         )
     grid.check([places[wanted[i][1]][axis] for indices in matched.values() for i in indices for axis in "xyz"])
     if kind == "openni":
         joints = {name: np.where((v == 0.0).all(axis=1)[:, None], np.nan, v) for name, v in joints.items()}
     return Recording(
-        grid.path, kind, joints, lines=lines, up=(0.0, -1.0, 0.0) if kind in ("mediapipe", "azure") else (0.0, 1.0, 0.0), names=names,
+        grid.path, kind, joints, lines=lines, up=(0.0, -1.0, 0.0) if kind in ("mediapipe", "azure") else (0.0, 1.0,
+        0.0), names=names,
         notes=notes, image=kind in ("mediapipe", "table"),
     )  # fmt: skip
 
@@ -114,19 +119,33 @@ def _only_said(
     unknown = [joint for joint in said.joints if joint not in joints]
     if unknown or not joints:
         raise MotionError(
-            f"{grid.path}: no column has the axis of a point in its name, so joints need three columns each: --joints LShoulder=X,Y,Z; "
+            f"{grid.path}: no column has the axis of a point in its name, so joints need three columns each: "
+            f"--joints LShoulder=X,Y,Z; "
             f"{', '.join(unknown[:4]) or 'none'} {'has' if len(unknown) == 1 else 'have'} not"
         )
-    return Recording(grid.path, kind, joints, lines=lines, names=[cell for cell in grid.header[-1] if cell] if grid.header else [], notes=notes)
+    return Recording(
+        grid.path,
+        kind,
+        joints,
+        lines=lines,
+        names=[cell for cell in grid.header[-1] if cell] if grid.header else [],
+        notes=notes,
+    )
 
 
-def points_by_person(grid: Grid, keys: Sequence[str], said: Said, notes: list[str]) -> tuple[list[tuple[str, str]], list[str]]:
+def points_by_person(
+    grid: Grid, keys: Sequence[str], said: Said, notes: list[str]
+) -> tuple[list[tuple[str, str]], list[str]]:
     """Points of one person where names begin with a person's name and a colon: pairs of name and key, and notes."""
     groups: dict[str, list[tuple[str, str]]] = {}
     for key in keys:
         who, _, name = key.rpartition(":")
         groups.setdefault(who, []).append((name, key))
-    arms = [who for who, pairs in groups.items() if {"LShoulder", "RShoulder"} & set(joint_points([name for name, _ in pairs]))]
+    arms = [
+        who
+        for who, pairs in groups.items()
+        if {"LShoulder", "RShoulder"} & set(joint_points([name for name, _ in pairs]))
+    ]
     if len(arms) < 2:
         return [(key.rpartition(":")[2] or key, key) for key in keys], notes
     index, more = chosen(grid.path, arms, said)
@@ -142,7 +161,9 @@ def _stamps(grid: Grid, columns: Columns, said: Said) -> Stamps | None:
         elif said.time.lower() in header:
             column = header.index(said.time.lower())
         else:
-            raise MotionError(f"{grid.path} has no column {said.time!r} of times; {nearest_name(said.time, header[:60])}")
+            raise MotionError(
+                f"{grid.path} has no column {said.time!r} of times; {nearest_name(said.time, header[:60])}"
+            )
         name = said.time
     if column < 0 and columns.frame >= 0:
         column, name = columns.frame, "frame"
@@ -170,7 +191,9 @@ def _said_point(grid: Grid, joint: str, place: str, names: Sequence[str]) -> int
         return lower.index(place.lower())
     if place.isdigit() and int(place) < len(names):
         return int(place)
-    raise MotionError(f"{grid.path} has no point {place!r} for {joint}; {nearest_name(place, [name[:60] for name in names[:200]])}")
+    raise MotionError(
+        f"{grid.path} has no point {place!r} for {joint}; {nearest_name(place, [name[:60] for name in names[:200]])}"
+    )
 
 
 def _triple(place: str) -> bool:

@@ -96,5 +96,6 @@ def from_ntu(path: Path, lines: list[str], said: Said) -> Recording:
     joints_of = points_to_joints(without_lost(table[part, :, :3], table[part, :, 3], said), layout, said)
     return Recording(
         path, "ntu", joints_of, fps=30.0, lines=np.array(places)[part], names=KINECT_JOINTS,
-        notes=[*notes, *([] if said.inferred else ["inferred joints count as untracked"]), "30 frames per second, as the data set has"],
+        notes=[*notes, *([] if said.inferred else ["inferred joints count as untracked"]), "30 frames per second, as "
+        "the data set has"],
     )  # fmt: skip

@@ -55,4 +55,6 @@ def chosen(path: Path, people: Sequence[str], said: Said) -> tuple[int, list[str
     if len(people) == 1:
         return 0, []
     others = ", ".join(f"{number} is {name[:30]}" for number, name in enumerate(people[:6], start=1))
-    return wanted - 1, [f"{len(people)} people in the file ({others}); person {wanted} was read, --person takes another"]
+    return wanted - 1, [
+        f"{len(people)} people in the file ({others}); person {wanted} was read, --person takes another"
+    ]

@@ -44,7 +44,11 @@ def from_numbers(grid: Grid, said: Said, format: str | None = None) -> Recording
         points, sure = _points(grid.values[sample], before, layout, width)
         if width in (4, 8) and sure is not None and not looks_like_certainty(sure):
             continue
-        label = f"{layout.name}" + (f" after {before} columns" if before else "") + (f" of {width} numbers" if width != 3 else "")
+        label = (
+            f"{layout.name}"
+            + (f" after {before} columns" if before else "")
+            + (f" of {width} numbers" if width != 3 else "")
+        )
         ways.append(Way(label, layout, points_to_joints(without_lost(points, sure, said), layout, said), extra))
         cuts.append((before, width))
     if columns == _CORNELL_COLUMNS and not said.order:
@@ -125,9 +129,10 @@ def _identities(lead: FloatArray) -> FloatArray | None:
     """The column before the joints that tells people apart: few whole numbers that come back, and no clock."""
     for column in lead.T:
         known = np.unique(column[np.isfinite(column)])
-        if 1 < len(known) <= 6 and (known == np.round(known)).all() and len(column) > 3 * len(known):
-            if (np.diff(column) < 0).any():
-                return column
+        few = 1 < len(known) <= 6 and (known == np.round(known)).all() and len(column) > 3 * len(known)
+        if few and (np.diff(column) < 0).any():
+            identities: FloatArray = column
+            return identities
     return None
 
 
@@ -135,9 +140,9 @@ def _times(lead: FloatArray, said: Said) -> Stamps | None:
     """The column before the joints that grows: times, or the number of the frame."""
     counting = None
     for index, column in enumerate(lead.T):
-        if not np.isfinite(column).all() or (np.diff(column) < 0).any() or not (np.diff(column) > 0).any():
-            if np.isfinite(column).all() or said.time != str(index):
-                continue
+        grows = np.isfinite(column).all() and (np.diff(column) >= 0).all() and (np.diff(column) > 0).any()
+        if not grows and said.time != str(index):
+            continue
         stamps = Stamps(column, said.time_unit, f"column {index + 1}")
         if said.time == str(index):
             return stamps
@@ -146,7 +151,9 @@ def _times(lead: FloatArray, said: Said) -> Stamps | None:
             return stamps
         counting = counting or stamps
     if counting is None and lead.shape[1] and np.isfinite(lead).any():
-        falling = [column for column in lead.T if np.isfinite(column).any() and len(np.unique(column)) > 0.5 * len(column)]
+        falling = [
+            column for column in lead.T if np.isfinite(column).any() and len(np.unique(column)) > 0.5 * len(column)
+        ]
         if falling:  # a clock that runs backward somewhere is a fault to be named, not a column to be left out
             return Stamps(falling[0], said.time_unit, "the first column")
     return counting if said.time is None else None

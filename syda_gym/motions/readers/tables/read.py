@@ -28,7 +28,9 @@ def is_table(path: Path) -> bool:
     start = first_bytes(path, 16_384)
     if not start or (b"\0" in start and start[:2] not in (b"\xff\xfe", b"\xfe\xff")):
         return False
-    text = start.decode("utf-16" if start[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8", "replace").lstrip("\ufeff \r\n\t")
+    text = start.decode("utf-16" if start[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8", "replace").lstrip(
+        "\ufeff \r\n\t"
+    )
     if not text or text[:1] in ("{", "[", "<") or text.startswith("HIERARCHY"):
         return False
     if path.suffix.lower() in (".csv", ".tsv", ".trc", ".skeleton"):
@@ -119,6 +121,7 @@ def _headed_numbers(grid: Grid, said: Said, format: str | None) -> Recording:
         except MotionError as error:
             raise MotionError(f"{error} (the header says {shown})") from error
     raise MotionError(
-        f"{grid.path}: {columns} columns called {shown}: no joint is named; expected columns such as left_shoulder_x, left_shoulder_y, "
+        f"{grid.path}: {columns} columns called {shown}: no joint is named; expected columns such as "
+        f"left_shoulder_x, left_shoulder_y, "
         "left_shoulder_z. Say which is which: --joints LShoulder=NAME or LShoulder=X,Y,Z (columns), or a layout in YAML"
     )

@@ -20,7 +20,16 @@ __all__ = ["from_stacked", "is_stacked"]
 _AXIS = re.compile(r"(?:t|p|pos\s*)?([xyzw])\d*(?:\s*[(\[].*)?$", re.IGNORECASE)
 _UNITS = {"m": 1.0, "meters": 1.0, "metres": 1.0, "mm": 0.001, "millimeters": 0.001, "millimetres": 0.001, "cm": 0.01,
           "centimeters": 0.01, "centimetres": 0.01, "inches": 0.0254}  # fmt: skip
-_RATES = ("capture frame rate", "export frame rate", "camerarate", "datarate", "frequency", "frame rate", "framerate", "sample rate")
+_RATES = (
+    "capture frame rate",
+    "export frame rate",
+    "camerarate",
+    "datarate",
+    "frequency",
+    "frame rate",
+    "framerate",
+    "sample rate",
+)
 _SKIPPED = {"frame", "frame#", "sub frame", "time", "time (seconds)", "", "name", "id", "type", "parent"}
 
 
@@ -48,8 +57,12 @@ def from_stacked(grid: Grid, said: Said, format: str | None = None) -> Recording
             best, best_count = points, count
     if best_count < 1 and not said.joints:
         named = [cell for row in grid.header for cell in row if len(cell) > 1 and not numeric(cell)]
-        raise MotionError(f"{grid.path}: the header names no joint or marker that is known; it has {', '.join(named[:10])}")
-    recording = from_names(grid, best, said, format=format or _format(grid), notes=[f"{len(best)} points named above their axes"])
+        raise MotionError(
+            f"{grid.path}: the header names no joint or marker that is known; it has {', '.join(named[:10])}"
+        )
+    recording = from_names(
+        grid, best, said, format=format or _format(grid), notes=[f"{len(best)} points named above their axes"]
+    )
     recording.unit = _unit(grid)
     recording.fps = _rate(grid)
     recording.stamps = _stamps(grid)
@@ -105,7 +118,10 @@ def _unit(grid: Grid) -> float | None:
         for index, cell in enumerate(lower):
             if cell in ("length units", "units", "unit"):
                 below = grid.header[number + 1] if number + 1 < len(grid.header) else []
-                for value in (lower[index + 1] if index + 1 < len(lower) else "", below[index].lower() if index < len(below) else ""):
+                for value in (
+                    lower[index + 1] if index + 1 < len(lower) else "",
+                    below[index].lower() if index < len(below) else "",
+                ):
                     if value in _UNITS:
                         return _UNITS[value]
     for row in grid.header:
