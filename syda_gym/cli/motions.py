@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -16,11 +16,48 @@ __all__ = ["motions_app"]
 motions_app = typer.Typer(help="Look at recordings, check paired data sets, convert them.", no_args_is_help=True)
 
 
+_Joints = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--joints", help="Which joint is which: `LShoulder=NAME`, a number, or columns `X,Y,Z`.", metavar="JOINT=PLACE"
+    ),
+]
+_Unit = Annotated[str | None, typer.Option(help="Unit of length of the file: m, cm, mm, in, ft, or metres per unit.")]
+_Up = Annotated[str | None, typer.Option(help="Axis of the file that points up: y, z, -y, ...")]
+_Person = Annotated[int | None, typer.Option(help="Which of several people, from 1.", min=1)]
+_Layout = Annotated[Path | None, typer.Option(help="A YAML file that describes a format of your own.")]
+
+
+def _told(
+    joints: list[str] | None, unit: str | None, up: str | None, person: int | None, layout: Path | None
+) -> dict[str, Any]:
+    """What a person says about a recording, as ``load_motions`` takes it."""
+    from syda_gym.errors import OptionError
+
+    pairs = [text.partition("=") for text in joints or ()]
+    for name, sign, place in pairs:
+        if not sign or not name or not place:
+            raise OptionError(f"--joints {name}{sign}{place}: expected JOINT=PLACE, for example LShoulder=LeftArm")
+    return {
+        "joints": {name: place for name, _, place in pairs} or None,
+        "unit": unit,
+        "up": up,
+        "person": person,
+        "layout": layout,
+    }
+
+
 @motions_app.command("info")
 def _motions_info(
     spec: Annotated[str, typer.Argument(help="`embedded`, `format:PATH`, or a path.", metavar="SPEC")],
     picture: Annotated[Path | None, typer.Option(help="PNG to draw stick figures into.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    fps: Annotated[float | None, typer.Option(help="Frames per second, if the file does not say.")] = None,
+    joints: _Joints = None,
+    unit: _Unit = None,
+    up: _Up = None,
+    person: _Person = None,
+    layout: _Layout = None,
 ) -> None:
     """Say what a recording holds: bodies, actions, rate, gaps, and the units and axes that were found."""
     import json
@@ -28,11 +65,12 @@ def _motions_info(
 
     from rich.table import Table
 
-    from syda_gym.motions import MotionWarning, describe
+    from syda_gym.motions import MotionWarning, describe, load_motions
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MotionWarning)  # the notes below say the same
-        info = describe(spec, picture=picture)
+        loaded = load_motions(spec, fps=fps, **_told(joints, unit, up, person, layout))
+        info = describe(loaded, picture=picture)
     if as_json:
         typer.echo(json.dumps(info.to_dict(), indent=1))
         return
@@ -99,13 +137,18 @@ def _motions_convert(
     operator: Annotated[
         str, typer.Option(help="Re-express `operator` as this human of the catalog, say `adult`.")
     ] = "",
+    joints: _Joints = None,
+    unit: _Unit = None,
+    up: _Up = None,
+    person: _Person = None,
+    layout: _Layout = None,
 ) -> None:
     """Convert a recording into a motion file or a data set folder."""
     from syda_gym.embodiments import HumanSkeleton, catalog
     from syda_gym.errors import EmbodimentError
     from syda_gym.motions import conformed, load_motions, save_motions, write_dataset
 
-    motions = load_motions(spec, fps=fps)
+    motions = load_motions(spec, fps=fps, **_told(joints, unit, up, person, layout))
     if operator:
         body = catalog.get(operator)
         if not isinstance(body, HumanSkeleton):
