@@ -57,6 +57,7 @@ def joint_points(names: Sequence[str], parents: Sequence[int] | None = None) -> 
     places: dict[str, int] = {}
     for index, name in enumerate(names):
         places.setdefault("".join(c for c in name.rpartition(":")[2] if c.isalnum()).upper(), index)
+    places.pop("", None)  # what has no letters is no marker, and stands for those that are missing below
     for joint, sets in _SIDED.items():
         for side in "LR":
             points = _first(places, [[_sided(places, side, one) for one in each] for each in sets])
