@@ -63,7 +63,7 @@ def read_bag(path: str | Path, said: Said = NOTHING_SAID) -> Motions:
             check_size(part, BUDGET.text, "a part of a bag", MotionError)
     else:
         check_size(file, BUDGET.text, "a bag of ROS", MotionError)
-    found = arrays_from_child("open_bag", file, "reading bags of ROS", "ros")
+    found = arrays_from_child("open_bag", file, "reading bags of ROS", "ros", "rosbags")
     recording = _from_transforms(file, found, said) or _from_markers(file, found, said)
     if recording is None:
         topics = ", ".join(str(topic) for topic in found["topics"] if topic) or "no topic"

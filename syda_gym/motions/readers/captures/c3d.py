@@ -41,7 +41,7 @@ def read_c3d(path: str | Path, said: Said = NOTHING_SAID) -> Motions:
         MissingExtraError: ``ezc3d`` is not installed.
     """
     file = check_size(path, BUDGET.text, "a C3D file", MotionError)
-    found = arrays_from_child("open_c3d", file, "reading C3D", "c3d")
+    found = arrays_from_child("open_c3d", file, "reading C3D", "c3d", "ezc3d")
     points, labels = found["points"], [str(label) for label in found["labels"]]
     if points.ndim != 3 or points.shape[1] < len(labels):
         raise MotionError(f"{file} has {points.shape} points for {len(labels)} labels; it is damaged")

@@ -6,6 +6,7 @@ to a file, which is read as any stranger's file is.
 
 from __future__ import annotations
 
+import importlib.util
 import subprocess
 import sys
 import tempfile
@@ -24,7 +25,7 @@ _SECONDS = 60.0  # on the wall; the child ends itself after 20 s of processor ti
 _MISSING, _REFUSED = 3, 4  # exit codes that the scripts use
 
 
-def arrays_from_child(script: str, path: Path, feature: str, extra: str) -> dict[str, NDArray[Any]]:
+def arrays_from_child(script: str, path: Path, feature: str, extra: str, library: str) -> dict[str, NDArray[Any]]:
     """Runs one of the scripts beside this file on a recording.
 
     Args:
@@ -32,6 +33,7 @@ def arrays_from_child(script: str, path: Path, feature: str, extra: str) -> dict
         path: the recording.
         feature: for the message if the library is not installed.
         extra: of this package that installs it.
+        library: that the script needs.
 
     Returns:
         What the script found, by name.
@@ -40,6 +42,8 @@ def arrays_from_child(script: str, path: Path, feature: str, extra: str) -> dict
         MissingExtraError: the library is not installed.
         MotionError: the file cannot be opened.
     """
+    if library in sys.modules and sys.modules[library] is None or importlib.util.find_spec(library) is None:
+        raise MissingExtraError(feature, extra)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "found.npz"
         command = [sys.executable, "-P", str(Path(__file__).with_name(f"{script}.py")), str(path.resolve()), str(out)]
