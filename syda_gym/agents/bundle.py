@@ -104,7 +104,7 @@ def load_agent(path: str | os.PathLike[str], where: Any) -> Agent:
         raise AgentError(f"{card_path}: {error}") from error
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
         raise StorageError(
-            f"{card_path} is damaged: {type(error).__name__}: {shortened(str(error))}; train again or copy the "
+            f"{card_path} is damaged: {type(error).__name__}: {str(error)[:400]}; train again or copy the "
             f"bundle again"
         ) from error
 

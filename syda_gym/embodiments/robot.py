@@ -112,7 +112,7 @@ class RobotDescription:
             )
         except (TypeError, KeyError, ValueError, AttributeError, OverflowError) as error:
             raise EmbodimentError(
-                f"{file}: a wrong value or key: {shortened(str(error))}; see docs for the format"
+                f"{file}: a wrong value or key: {str(error)[:400]}; see docs for the format"
             ) from error
 
 

@@ -69,7 +69,6 @@ def open_archive(
         OSError,
         EOFError,
         RuntimeError,
-        NotImplementedError,
         ValueError,
     ) as problem:
         raise error(f"{file} is no readable archive: {problem}; expected {what}") from problem

@@ -11,7 +11,7 @@ import numpy as np
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.errors import StorageError, SydaError
-from syda_gym.files import atomic_path, check_tensors, fingerprint, read_bytes, read_json, shortened, write_json
+from syda_gym.files import atomic_path, check_tensors, fingerprint, read_bytes, read_json, write_json
 from syda_gym.mappings.card import MappingCard
 from syda_gym.mappings.chain import ChainMapping
 from syda_gym.mappings.coded_mapping import CodedMapping
@@ -103,7 +103,7 @@ def load_mapping(path: str | os.PathLike[str]) -> Mapping:
             RecursionError,
         ) as error:
             raise StorageError(
-                f"{card} and {weights.name} do not fit together: {type(error).__name__}: {shortened(str(error))}; "
+                f"{card} and {weights.name} do not fit together: {type(error).__name__}: {str(error)[:400]}; "
                 f"fit and save again"
             ) from error
     return links[0] if len(links) == 1 else ChainMapping(links)

@@ -52,7 +52,7 @@ class _Graph:
             if not all(0 < width <= _WIDEST for width in self._widths.values()):
                 raise ValueError(f"its card gives inputs of {shortened(list(self._widths.values()))} numbers")
         except Exception as error:  # onnxruntime raises classes of its own that it does not export
-            raise StorageError(f"{file} is no agent exported by this library: {shortened(str(error))}") from error
+            raise StorageError(f"{file} is no agent exported by this library: {str(error)[:400]}") from error
         needed = {self.first, "state", "fresh"}
         if not {"state", "fresh"} <= set(self._widths):
             raise StorageError(

@@ -42,7 +42,7 @@ def arrays_from_child(script: str, path: Path, feature: str, extra: str, library
         MissingExtraError: the library is not installed.
         MotionError: the file cannot be opened.
     """
-    if library in sys.modules and sys.modules[library] is None or importlib.util.find_spec(library) is None:
+    if (library in sys.modules and sys.modules[library] is None) or importlib.util.find_spec(library) is None:
         raise MissingExtraError(feature, extra)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "found.npz"

@@ -121,7 +121,7 @@ def read_npz(path: str | os.PathLike[str]) -> Motions:
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError, RecursionError) as error:
         raise MotionError(
             f"{file} is no motion file of this library or is damaged ({type(error).__name__}: "
-            f"{shortened(str(error))}); "
+            f"{str(error)[:400]}); "
             "expected one written by save_motions"
         ) from error
 

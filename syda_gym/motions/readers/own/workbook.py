@@ -44,7 +44,7 @@ def read_sheets(path: Path, names: Sequence[str]) -> dict[str, FloatArray]:
     except MotionError:
         raise
     except Exception as error:  # calamine raises its own error types, which are no part of its public interface
-        raise MotionError(f"{path} is not a readable .xlsx workbook: {shortened(str(error))}") from error
+        raise MotionError(f"{path} is not a readable .xlsx workbook: {str(error)[:400]}") from error
     for name in names:
         if name not in rows:
             raise MotionError(f"{path}: sheet {name!r} is missing; it has {shortened(sorted(known))}")
@@ -100,7 +100,7 @@ def _table(path: Path, sheet: str, rows: list[list[object]]) -> FloatArray:
     try:
         table = np.array([row[:7] for row in rows[1:]], dtype=np.float64).reshape(-1, 7)
     except (TypeError, ValueError) as error:
-        raise MotionError(f"{path}, sheet {sheet!r}: a cell is no number: {shortened(str(error))}") from error
+        raise MotionError(f"{path}, sheet {sheet!r}: a cell is no number: {str(error)[:400]}") from error
     if len(table) == 0:
         raise MotionError(f"{path}, sheet {sheet!r}: no rows")
     bad = np.argwhere(~np.isfinite(table))
