@@ -177,8 +177,10 @@ def with_units_and_turns(path: Path) -> Path:
 
 
 def msrc12(path: Path) -> Path:
-    order = "Pelvis Torso Neck Head LShoulder LElbow LHand LHand RShoulder RElbow RHand RHand LHip LKnee LFoot LToe "
-    "RHip RKnee RFoot RToe"
+    order = (
+        "Pelvis Torso Neck Head LShoulder LElbow LHand LHand RShoulder RElbow RHand RHand LHip LKnee LFoot LToe "
+        "RHip RKnee RFoot RToe"
+    )
     points = np.concatenate([_order(order, _person(rec.KINECT_AXES)), np.full((COUNT, 20, 1), 2.0)], axis=2)
     ticks = 634_000_000_000_000.0 + np.arange(COUNT)[:, None] * 333_333.0
     return _csv(path / "P1_1_1_p06.csv", [], np.concatenate([ticks, points.reshape(COUNT, -1)], axis=1), " ")
@@ -234,10 +236,14 @@ def underscore(path: Path) -> Path:
 
 COCO = "Nose Eye Eye Head Head LShoulder RShoulder LElbow RElbow LHand RHand LHip RHip LKnee RKnee LFoot RFoot"
 H36M = "Pelvis RHip RKnee RFoot LHip LKnee LFoot Torso Neck Nose Head LShoulder LElbow LHand RShoulder RElbow RHand"
-SMPL = "Pelvis LHip RHip Torso LKnee RKnee Torso LFoot RFoot Torso LToe RToe Neck Neck Neck Head LShoulder RShoulder "
-"LElbow RElbow LHand RHand"
-LAFAN = "Pelvis LHip LKnee LFoot LToe RHip RKnee RFoot RToe Torso Torso Torso Neck Head Neck LShoulder LElbow LHand "
-"Neck RShoulder RElbow RHand"
+SMPL = (
+    "Pelvis LHip RHip Torso LKnee RKnee Torso LFoot RFoot Torso LToe RToe Neck Neck Neck Head LShoulder RShoulder "
+    "LElbow RElbow LHand RHand"
+)
+LAFAN = (
+    "Pelvis LHip LKnee LFoot LToe RHip RKnee RFoot RToe Torso Torso Torso Neck Head Neck LShoulder LElbow LHand "
+    "Neck RShoulder RElbow RHand"
+)
 XSENS = ("Pelvis Torso Torso Torso Neck Neck Head Neck RShoulder RElbow RHand Neck LShoulder LElbow LHand RHip RKnee "
 "RFoot RToe LHip LKnee "
          "LFoot LToe")  # fmt: skip
