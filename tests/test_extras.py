@@ -22,10 +22,15 @@ FEATURES = {
         "onnx",
         "from syda_gym.agents.deployment import export; export.export_onnx(None, 'agent.onnx')",
     ),
-    "bvh": (
-        "pymotion",
-        "from motions.recordings import bvh_text; from pathlib import Path; Path('a.bvh').write_text(bvh_text());"
-        "import syda_gym; syda_gym.load_motions('bvh:a.bvh')",
+    "c3d": (
+        "ezc3d",
+        "from pathlib import Path; Path('a.c3d').write_bytes(b'xP' * 500); import syda_gym; "
+        "syda_gym.load_motions('a.c3d')",
+    ),
+    "ros": (
+        "rosbags",
+        "from pathlib import Path; Path('a.bag').write_bytes(b'#ROSBAG V2.0'); import syda_gym; "
+        "syda_gym.load_motions('a.bag')",
     ),
     "live": (
         "websockets",

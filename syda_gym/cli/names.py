@@ -31,7 +31,10 @@ __all__ = [
 BODIES = ("adult", "kid", "pepper", "nao", "child", "left_only", "long_arms", "stiff", "tall")
 """Bodies of the catalog; robots that the user added come to them."""
 
-FORMATS = ("paper", "pairs", "npz", "bvh", "kinect", "openni", "mediapipe", "film")
+FORMATS = (
+    "paper", "pairs", "npz", "bvh", "c3d", "bag", "kinect", "azure", "openni", "film", "mediapipe", "keypoints",
+    "table",
+)  # fmt: skip
 """Prefixes of ``format:PATH``; see ``syda-gym motions formats``."""
 
 METHODS: dict[str, tuple[str, ...]] = {

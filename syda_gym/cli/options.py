@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -40,7 +40,9 @@ __all__ = [
     "DisturbancesOption",
     "FpsOption",
     "HeldOutOption",
+    "JointsOption",
     "JsonOption",
+    "LayoutOption",
     "MappingOption",
     "MaxHopsOption",
     "MethodOption",
@@ -50,6 +52,7 @@ __all__ = [
     "OperatorOption",
     "OutFolderOption",
     "PairOption",
+    "PersonOption",
     "PhysicsHzOption",
     "PictureOption",
     "PresetOption",
@@ -60,6 +63,8 @@ __all__ = [
     "SourceOption",
     "SpecArgument",
     "TokenOption",
+    "UnitOption",
+    "UpOption",
     "ViewAddressOption",
     "ViewOption",
     "WorkersOption",
@@ -67,6 +72,7 @@ __all__ = [
     "mapping_of",
     "pairs_of",
     "route_of",
+    "said_of",
 ]
 
 _SPEC = f"`embedded`, a path, or `FORMAT:PATH` with one of {ticked(FORMATS)}."
@@ -227,6 +233,19 @@ ModelOption = Annotated[
     Path | None, typer.Option("--model", help="Pose model of cameras and films, a `.task` file (extra `camera`).")
 ]
 
+JointsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--joints", help="Which joint is which: `LShoulder=NAME`, a number, or columns `X,Y,Z`.", metavar="JOINT=PLACE"
+    ),
+]
+UnitOption = Annotated[
+    str | None, typer.Option("--unit", help="Unit of length of the file: m, cm, mm, in, ft, or metres per unit.")
+]
+UpOption = Annotated[str | None, typer.Option("--up", help="Axis of the file that points up: y, z, -y, ...")]
+PersonOption = Annotated[int | None, typer.Option("--person", help="Which of several people, from 1.", min=1)]
+LayoutOption = Annotated[Path | None, typer.Option("--layout", help="A YAML file that describes a format of your own.")]
+
 
 def route_of(text: str) -> str | tuple[str, ...]:
     """What ``--route`` gave, as the library takes it: ``"auto"`` or the bodies."""
@@ -274,3 +293,22 @@ def mapping_of(method: str | None, preset: str | None, mapping: Path | None) -> 
             f"method {name!r} has no preset {chosen!r}; {nearest_name(chosen, METHODS[name])}", param_hint="'--preset'"
         )
     return name, chosen
+
+
+def said_of(
+    joints: list[str] | None, unit: str | None, up: str | None, person: int | None, layout: Path | None
+) -> dict[str, Any]:
+    """What a person says about a recording, as ``load_motions`` takes it."""
+    from syda_gym.errors import OptionError
+
+    pairs = [text.partition("=") for text in joints or ()]
+    for name, sign, place in pairs:
+        if not sign or not name or not place:
+            raise OptionError(f"--joints {name}{sign}{place}: expected JOINT=PLACE, for example LShoulder=LeftArm")
+    return {
+        "joints": {name: place for name, _, place in pairs} or None,
+        "unit": unit,
+        "up": up,
+        "person": person,
+        "layout": layout,
+    }

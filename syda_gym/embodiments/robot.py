@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import yaml
 from numpy.typing import ArrayLike, NDArray
 
 from syda_gym.embodiments.embodiment import SIDES, Embodiment, Feature, FloatArray, Side
@@ -18,7 +17,7 @@ from syda_gym.embodiments.kinematics.arm_chain import ArmChain
 from syda_gym.embodiments.kinematics.coupled import coupled_range
 from syda_gym.embodiments.kinematics.urdf import arm_chain, read_urdf
 from syda_gym.errors import EmbodimentError, nearest_name
-from syda_gym.files import fingerprint
+from syda_gym.files import fingerprint, read_yaml, shortened
 
 __all__ = ["ArmDescription", "CoupledLimit", "Robot", "RobotDescription"]
 
@@ -92,16 +91,13 @@ class RobotDescription:
         file = Path(path)
         if not file.is_file():
             raise EmbodimentError(f"no robot description {file}; write one with `syda-gym robot add URDF`")
-        try:
-            data = yaml.safe_load(file.read_text(encoding="utf-8"))
-        except (yaml.YAMLError, ValueError, RecursionError) as error:
-            raise EmbodimentError(f"{file} is not valid YAML: {error}") from error
+        data = read_yaml(file, "a robot description (YAML)", EmbodimentError)
         needed = {"name", "urdf", "torso", "height", "arms"}
         allowed = needed | {"coupled_limits", "rest", "disabled_collisions", "axes"}
         if not isinstance(data, dict) or not needed <= set(data):
-            raise EmbodimentError(f"{file}: expected the keys {sorted(needed)}, got {data and sorted(map(str, data))}")
+            raise EmbodimentError(f"{file}: expected the keys {sorted(needed)}, got {shortened(data)}")
         for key in set(data) - allowed:
-            raise EmbodimentError(f"{file}: unknown key {key!r}; {nearest_name(str(key), allowed)}")
+            raise EmbodimentError(f"{file}: unknown key {shortened(key)}; {nearest_name(shortened(key, 40), allowed)}")
         try:
             return cls(
                 name=str(data["name"]),
@@ -115,7 +111,9 @@ class RobotDescription:
                 axes=_rotation_rows(data["axes"]) if data.get("axes") else None,
             )
         except (TypeError, KeyError, ValueError, AttributeError, OverflowError) as error:
-            raise EmbodimentError(f"{file}: a wrong value or key: {error}; see docs for the format") from error
+            raise EmbodimentError(
+                f"{file}: a wrong value or key: {str(error)[:400]}; see docs for the format"
+            ) from error
 
 
 class Robot(Embodiment):

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
+from syda_gym.errors import MappingError
+from syda_gym.files import shortened
 from syda_gym.mappings.models.scaling import Scaler
 
 __all__ = ["Confidence", "action_maximum", "fit_confidence", "gain"]
@@ -16,6 +18,7 @@ __all__ = ["Confidence", "action_maximum", "fit_confidence", "gain"]
 _ANCHORS = 200
 _QUANTILE = 0.9
 _FAMILIAR = 0.99
+_LARGEST_BOUND = 10.0  # m
 
 
 class Confidence:
@@ -76,15 +79,25 @@ class Confidence:
 
     @classmethod
     def restore(cls, settings: dict[str, Any], arrays: Dict[str, FloatArray], name: str) -> Confidence:
-        """Rebuilds what ``settings`` and ``arrays`` gave."""
+        """Rebuilds what ``settings`` and ``arrays`` gave.
+
+        Raises:
+            MappingError: a number out of its range; a negative bound or a threshold that is no number would switch off
+                the slowing down of the live loop.
+        """
         bound = settings["bound"]
+        anchors, scale = arrays[f"{name}.anchors"], Scaler.restore(arrays, f"{name}.scale")
+        if anchors.ndim != 2 or anchors.shape[1] != len(scale.mean) or not len(anchors):
+            raise MappingError(
+                f"{name}: anchors of shape {anchors.shape} do not fit codes of {len(scale.mean)} numbers"
+            )
         return cls(
-            None if bound is None else float(bound),
-            float(settings["gain"]),
-            Scaler.restore(arrays, f"{name}.scale"),
-            arrays[f"{name}.anchors"],
-            float(settings["width"]),
-            float(settings["threshold"]),
+            None if bound is None else _within(f"{name}.bound", bound, 0.0, _LARGEST_BOUND),
+            _within(f"{name}.gain", settings["gain"], 0.0, 1e6),
+            scale,
+            anchors,
+            _within(f"{name}.width", settings["width"], 1e-12, 1e12),
+            _within(f"{name}.threshold", settings["threshold"], 0.0, 1.0),
         )
 
 
@@ -113,6 +126,13 @@ def fit_confidence(codes: FloatArray, actions: NDArray[np.str_], bound: float | 
     far = float(np.quantile(held_out, _FAMILIAR))
     threshold = float(1.0 - np.exp(-0.5 * (max(far, 1e-3) / width) ** 2))
     return Confidence(bound, enlargement, scale, anchors, width, min(threshold, 1.0 - 1e-9))
+
+
+def _within(name: str, value: Any, low: float, high: float) -> float:
+    number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else float("nan")
+    if not low <= number <= high:
+        raise MappingError(f"{name} must be a number between {low:g} and {high:g}, got {shortened(value, 60)}")
+    return number
 
 
 def action_maximum(errors: FloatArray, actions: NDArray[np.str_]) -> float:

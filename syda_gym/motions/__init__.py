@@ -8,7 +8,7 @@ from syda_gym.motions.pairing.alignment import ActionQuality, Alignment, align, 
 from syda_gym.motions.pairing.conform import conformed
 from syda_gym.motions.pairing.dataset_check import Finding, validate_dataset
 from syda_gym.motions.pairing.recorded_session import Session, operator_clips, pair_session
-from syda_gym.motions.readers.npz import save_motions
+from syda_gym.motions.readers.own.npz import save_motions
 from syda_gym.motions.readers.skeleton import MotionWarning
 from syda_gym.motions.resampling import resampled
 from syda_gym.motions.stick_figures import draw_clips

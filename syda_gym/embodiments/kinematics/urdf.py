@@ -11,6 +11,7 @@ import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray, Side
 from syda_gym.embodiments.kinematics.arm_chain import ArmChain
+from syda_gym.embodiments.kinematics.urdf_budget import check_urdf_tree
 from syda_gym.errors import EmbodimentError, nearest_name
 
 __all__ = ["JointLimits", "UrdfTree", "arm_chain", "read_urdf", "zero_placements"]
@@ -102,6 +103,7 @@ def read_urdf(path: str | Path) -> UrdfTree:
         raise EmbodimentError(f"no URDF {file}; check the path")
     if file.stat().st_size > _MAX_URDF_BYTES:
         raise EmbodimentError(f"{file} is larger than {_MAX_URDF_BYTES >> 20} MB; that is no plain URDF")
+    check_urdf_tree(file)
     try:
         urdf = yourdfpy.URDF.load(
             str(file), build_scene_graph=False, load_meshes=False, build_collision_scene_graph=False

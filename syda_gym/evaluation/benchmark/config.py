@@ -10,11 +10,11 @@ from typing import Any
 
 from syda_gym.errors import OptionError, StorageError, nearest_name
 from syda_gym.evaluation.chains import Route, all_routes, check_route, robots_of
+from syda_gym.files import read_yaml
 from syda_gym.motions.clip import Motions
 
 __all__ = ["BenchmarkConfig", "EfficiencyConfig", "split_method"]
 
-_MAX_BYTES = 2**20
 _MAX_SEEDS = 10_000
 _MAX_DRAWS = 1_000
 
@@ -163,17 +163,10 @@ class BenchmarkConfig:
             StorageError: no such file, too large, or not YAML.
             OptionError: unknown keys or bad values.
         """
-        import yaml
-
         file = Path(path)
         if not file.is_file():
             raise StorageError(f"no benchmark configuration {file}; write one, see docs/benchmark.md")
-        if file.stat().st_size > _MAX_BYTES:
-            raise StorageError(f"{file} is larger than {_MAX_BYTES} bytes; expected a short YAML file")
-        try:
-            data = yaml.safe_load(file.read_text(encoding="utf-8"))
-        except (yaml.YAMLError, ValueError, RecursionError) as error:
-            raise StorageError(f"{file} is not valid YAML: {' '.join(str(error).split())}") from error
+        data = read_yaml(file, "a benchmark configuration (short YAML)")
         if not isinstance(data, dict):
             raise OptionError(f"{file}: expected keys and values, got {type(data).__name__}")
         try:

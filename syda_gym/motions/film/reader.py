@@ -13,6 +13,7 @@ from syda_gym.motions.film.landmarks import JOINTS, VISIBLE
 from syda_gym.motions.film.pictures import FilmPictures
 from syda_gym.motions.film.pose_model import PoseModel, find_model
 from syda_gym.motions.readers.skeleton import Recording, motions_from
+from syda_gym.motions.readers.times import Stamps
 
 __all__ = ["ENDINGS", "is_film", "read_film"]
 
@@ -68,7 +69,13 @@ def read_film(path: str | Path, model: str | Path | None = None) -> Motions:
     notes += [f"a person is seen in {found} of {len(rows)} pictures"]
     return motions_from(
         Recording(
-            file, "film", joints, timestamps=np.array(times), up=(0.0, -1.0, 0.0), names=tuple(JOINTS), notes=notes
+            file,
+            "film",
+            joints,
+            stamps=Stamps(np.array(times), "s", "time of the film"),
+            up=(0.0, -1.0, 0.0),
+            names=tuple(JOINTS),
+            notes=notes,
         )
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import SydaError
 from syda_gym.motions.clip import Motions, Take
-from syda_gym.motions.readers.npz import save_motions
+from syda_gym.motions.readers.own.npz import save_motions
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.tick import Decision
 
