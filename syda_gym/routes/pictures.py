@@ -18,7 +18,8 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.routes import general, paper
 from syda_gym.routes.general import Sampling
 from syda_gym.routes.metric import Definition, Transferability, pair_arms, transferability
-from syda_gym.routes.routing import Body, BodyGraph, Route
+from syda_gym.routes.route import Route
+from syda_gym.routes.routing import Body, BodyGraph
 from syda_gym.routes.workspace.sampling import Workspace, generic_rank
 from syda_gym.routes.workspace.store import MEMORY, WorkspaceStore
 

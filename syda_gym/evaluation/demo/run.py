@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from syda_gym.agents.agent import Agent
     from syda_gym.mappings.mapping import Mapping
     from syda_gym.routes.metric import Transferability
-    from syda_gym.routes.routing import Route as BestRoute
+    from syda_gym.routes.route import Route as BestRoute
 
 __all__ = ["run_demo"]
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from syda_gym.evaluation.prediction.results import PredictionStudy
 from syda_gym.evaluation.report.model import Cell, Column, Table
 from syda_gym.routes.metric import Transferability
-from syda_gym.routes.routing import Route
+from syda_gym.routes.route import Route
 from syda_gym.routes.suggestion import SpanningPairs, Suggestion
 
 __all__ = ["links_table", "prediction_table", "routes_table", "suggestions_table"]
