@@ -86,7 +86,7 @@ def _robot_add(
         bodies = ["adult", "kid", "pepper", added.robot.name]
         known = [("adult", "kid"), ("kid", "pepper"), ("adult", "pepper")]
         people = {"adult", "kid"}  # a recording session pairs a person with a robot
-        pairs = [choice.pair for choice in rank(bodies, known, samples=2**16) if people & set(choice.pair)]
+        pairs = [choice.pair for choice in rank(bodies, known) if people & set(choice.pair)]
         best = next(pair for pair in pairs if added.robot.name in pair)
         say.print(f"record next: {best[0]} with {best[1]} (of the pairs with a person it connects most)")
     if view:

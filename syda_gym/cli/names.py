@@ -65,10 +65,10 @@ SINGLE_DISTURBANCES = (
 PROTOCOLS = ("rand3", "twin3", "loao")
 """Ways to hold out frames."""
 
-DEFINITIONS = ("general", "paper")
+DEFINITIONS = ("dry_run", "general", "paper")
 """Definitions of transferability."""
 
-PREDICTORS = ("T", "C", "L", "coverage", "arm_length_ratio", "hops", "measured")
+PREDICTORS = ("dry_run", "T", "C", "L", "coverage", "arm_length_ratio", "hops", "measured")
 """What a route can be chosen by."""
 
 RIVALS = ("base", "lead", "one_euro", "one_euro_lead", "ema_lead", "projection", "projection_lead", "kalman")

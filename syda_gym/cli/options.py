@@ -59,6 +59,7 @@ __all__ = [
     "RobotOption",
     "RouteOption",
     "SeedOption",
+    "SensorOption",
     "SinkOption",
     "SourceOption",
     "SpecArgument",
@@ -73,6 +74,7 @@ __all__ = [
     "pairs_of",
     "route_of",
     "said_of",
+    "sensors_of",
 ]
 
 _SPEC = f"`embedded`, a path, or `FORMAT:PATH` with one of {ticked(FORMATS)}."
@@ -174,12 +176,18 @@ AGENT_HELP = f"A bundle's path, a rival ({ticked(RIVALS)}) or a shipped agent ({
 """What stands in the help of an argument that takes any agent."""
 
 DefinitionOption = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--definition", help=f"Of transferability: {ticked(DEFINITIONS)}.",
         callback=checks.one_of(DEFINITIONS, "definition"),
     ),
 ]  # fmt: skip
+SensorOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--sensor", help="Noise of a body's landmarks in the dry run [m], repeatable: `kid=0.015`.", metavar="BODY=M"
+    ),
+]
 CountOption = Annotated[int, typer.Option("--count", help="How many to list at most.", min=1)]
 MaxHopsOption = Annotated[int | None, typer.Option("--max-hops", help="Longest chain, in links.", min=1)]
 PhysicsHzOption = Annotated[
@@ -312,3 +320,21 @@ def said_of(
         "person": person,
         "layout": layout,
     }
+
+
+def sensors_of(values: list[str] | None) -> dict[str, float] | None:
+    """``BODY=M`` as body to metres.
+
+    Raises:
+        BadParameter: something else.
+    """
+    found: dict[str, float] = {}
+    for text in values or ():
+        name, _, number = text.partition("=")
+        try:
+            found[name] = float(number)
+        except ValueError:
+            raise typer.BadParameter(
+                f"expected BODY=METRES such as kid=0.015, got {text!r}", param_hint="'--sensor'"
+            ) from None
+    return found or None

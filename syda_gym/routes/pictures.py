@@ -18,7 +18,8 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.routes import general, paper
 from syda_gym.routes.general import Sampling
 from syda_gym.routes.metric import Definition, Transferability, pair_arms, transferability
-from syda_gym.routes.routing import Body, BodyGraph, Route
+from syda_gym.routes.route import Route
+from syda_gym.routes.routing import Body, BodyGraph
 from syda_gym.routes.workspace.sampling import Workspace, generic_rank
 from syda_gym.routes.workspace.store import MEMORY, WorkspaceStore
 
@@ -207,7 +208,10 @@ def graph_png(
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
     )  # fmt: skip
     if route is not None:
-        text = f"{' → '.join(route.bodies)}    T = {route.T:.3f} ± {route.tolerance:.3f}"
+        worth = f"T = {route.T:.3f} ± {route.tolerance:.3f}"
+        if route.error is not None and route.standard_error is not None:
+            worth = f"expected error {1000 * route.error:.0f} ± {1000 * route.standard_error:.0f} mm"
+        text = f"{' → '.join(route.bodies)}    {worth}"
         if route.ties:
             text += "\nties with " + "; ".join(" → ".join(other.bodies) for other in route.ties[:3])
         axis.set_title(text, fontsize=11)

@@ -19,7 +19,7 @@ from syda_gym.motions.clip import Motions
 
 if TYPE_CHECKING:
     from syda_gym.mappings.mapping import Mapping
-    from syda_gym.routes.routing import Route
+    from syda_gym.routes.route import Route
 
 __all__ = ["FIT_FPS", "Pilot", "PlannedRoute"]
 

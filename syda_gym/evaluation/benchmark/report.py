@@ -35,7 +35,6 @@ from syda_gym.motions.clip import Motions
 __all__ = ["differences_table", "summary_table", "write_benchmark_report"]
 
 _GROUP = ("route", "method", "agent", "disturbance")
-_SAMPLES = 2**16  # of each workspace: enough to colour a graph
 _MOST_SHOWN = 250  # chains in the playback
 
 Scores = dict[tuple[str, str], float]
@@ -233,7 +232,7 @@ def _link_scores(episodes: Results, motions: Motions) -> Scores:
         for a, b in _edges(route):
             if (a, b) not in scores:
                 try:
-                    scores[a, b] = transferability(motions.bodies[a], motions.bodies[b], samples=_SAMPLES).T
+                    scores[a, b] = transferability(motions.bodies[a], motions.bodies[b]).T
                 except SydaError:
                     scores[a, b] = math.nan
     return scores

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from syda_gym.agents.agent import Agent
     from syda_gym.mappings.mapping import Mapping
     from syda_gym.routes.metric import Transferability
-    from syda_gym.routes.routing import Route as BestRoute
+    from syda_gym.routes.route import Route as BestRoute
 
 __all__ = ["run_demo"]
 
@@ -34,7 +34,6 @@ _BODIES = ("adult", "kid", "nao", "pepper")
 """Bodies of the demo, where the motions have them: a small graph that still has several ways to go."""
 
 _FEW_ACTIONS = 12  # up to so many actions each is left out once; with more, one fifth is held out
-_SAMPLES = 2**18  # of each workspace; the spread over seeds is printed
 
 
 def run_demo(
@@ -191,7 +190,7 @@ def _measure(
     general, paper = {}, {}
     for done, (a, b) in enumerate(edges):
         tell("transferability", done / len(edges))
-        general[a, b] = transferability(motions.bodies[a], motions.bodies[b], samples=_SAMPLES)
+        general[a, b] = transferability(motions.bodies[a], motions.bodies[b])
         if {a, b} <= in_paper:
             paper[a, b] = transferability(a, b, "paper")
     return general, paper
@@ -203,7 +202,7 @@ def _best(motions: Motions, routes: list[Route], operator: str, robot: str) -> B
     pairs = list(dict.fromkeys(edge for route in routes for edge in _edges(route)))
     fitted = [(motions.bodies[a], motions.bodies[b]) for a, b in pairs]
     ends = motions.bodies[operator], motions.bodies[robot]
-    return best_route(*ends, fitted, max_hops=2, directed=True, samples=_SAMPLES)
+    return best_route(*ends, fitted, max_hops=2, directed=True)
 
 
 def _play_chain(
