@@ -234,7 +234,7 @@ class Robot(Embodiment):
 
 def _refuse_followers(tree: UrdfTree, arm: ArmDescription) -> None:
     """A joint that follows one of the arm's own would move elbow or wrist in ways that no chain of joints knows."""
-    if arm.joints[0] not in tree.joints or arm.wrist not in tree.links():
+    if not arm.joints or arm.joints[0] not in tree.joints or arm.wrist not in tree.links():
         return  # told by name where the chain is built
     for name in tree.path_to(tree.joints[arm.joints[0]].parent, arm.wrist) or ():
         mimic = tree.joints[name].mimic
