@@ -237,7 +237,7 @@ def _refuse_followers(tree: UrdfTree, arm: ArmDescription) -> None:
     if not arm.joints or arm.joints[0] not in tree.joints or arm.wrist not in tree.links():
         return  # told by name where the chain is built
     for name in tree.path_to(tree.joints[arm.joints[0]].parent, arm.wrist) or ():
-        mimic = tree.joints[name].mimic
+        mimic = None if tree.joints[name].type == "fixed" else tree.joints[name].mimic
         if mimic is not None and mimic.multiplier and mimic.joint in arm.joints and name not in arm.joints:
             raise EmbodimentError(
                 f"{tree.path.name}: joint {name!r} of the {arm.side} arm follows {mimic.joint!r} (<mimic>), and arms are "

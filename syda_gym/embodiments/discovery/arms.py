@@ -145,7 +145,7 @@ def _notes(tree: UrdfTree, arms: Sequence[ArmDescription], chosen: dict[Side, tu
         name
         for arm in arms
         for name in tree.path_to(tree.joints[arm.joints[0]].parent, arm.tip) or ()
-        if tree.joints[name].mimic is not None
+        if tree.joints[name].mimic is not None and tree.joints[name].type != "fixed"
     ]
     if followers:
         notes.append(f"joints that follow others (<mimic>) stand still: {', '.join(dict.fromkeys(followers))}")

@@ -22,6 +22,9 @@ _FINGER = re.compile(r"finger|thumb", re.I)
 _NEAR = 0.025  # m; a link that ends nearer to the last joint than this says nothing about where the arm ends
 
 
+_MOST = 0.8  # of the way from the root; what a last joint moves is not longer than that
+
+
 @dataclass(frozen=True, eq=False)
 class ArmEnd:
     """Where an arm ends.
@@ -55,12 +58,24 @@ def arm_end(tree: UrdfTree, placements: dict[str, FloatArray], last: str, axis: 
     if distances.get(best, 0.0) > _NEAR:
         return ArmEnd(best, np.zeros(3), placements[best][:3, 3], "link")
     fallback = best if distances.get(best, 0.0) > 1e-6 else last
+    most = _MOST * _chain_length(tree, placements, last)
     for source, place in (("shape", _by_shape(tree, placements, last, origin)),
                           ("mass", _by_mass(tree, placements, last, origin))):  # fmt: skip
-        if place is not None:
+        # A mesh in other units or about another origin reaches out of the robot.
+        if place is not None and float(np.linalg.norm(place - origin)) < most:
             offset = placements[last][:3, :3].T @ (place - placements[last][:3, 3])
             return ArmEnd(last, offset, place, source)
     return ArmEnd(fallback, np.zeros(3), placements[fallback][:3, 3], "none")
+
+
+def _chain_length(tree: UrdfTree, placements: dict[str, FloatArray], last: str) -> float:
+    """Way along the link origins from the root to ``last`` [m]."""
+    length, link = 0.0, last
+    while link in tree.parent_joint:
+        parent = tree.joints[tree.parent_joint[link]].parent
+        length += float(np.linalg.norm(placements[link][:3, 3] - placements[parent][:3, 3]))
+        link = parent
+    return length
 
 
 def _by_shape(tree: UrdfTree, placements: dict[str, FloatArray], last: str, origin: FloatArray) -> FloatArray | None:

@@ -94,26 +94,40 @@ class _Axes:
         self._chain: ArmChain = arm_chain(tree, parent, side, joints, (self.links[0], last, last, last))
 
     def elbow(self, end: ArmEnd) -> int:
-        """The joint that changes the distance from its shoulder to the end most."""
-        carriers, points = [], []
-        for candidate in range(1, len(self.joints)):
-            joint, place = self.shoulder(candidate)
-            carriers.append(joint)
-            points.append(self._in_link(joint, place))
+        """The joint that changes the distance from the shoulder to the end most.
+
+        The shoulder follows from the elbow, so both are sought in turn, from where the first axes meet.
+        """
+        joint, place = 0, self._first_place()
+        elbow = -1
+        for _ in range(4):
+            before, elbow = elbow, self._bending(joint, place, end)
+            if elbow == before:
+                break
+            joint, place = self.shoulder(elbow)
+        return elbow
+
+    def _first_place(self) -> FloatArray:
+        for other in self.lines[1:]:
+            foot = self.lines[0].foot(other)
+            if foot is not None:
+                return foot
+        return self.lines[0].point
+
+    def _bending(self, joint: int, place: FloatArray, end: ArmEnd) -> int:
+        """The joint beyond ``joint`` that changes the distance from ``place``, which rides on it, to the end most."""
         last = len(self.joints) - 1
         chain = replace(
             self._chain,
-            point_joints=(*carriers, last),
-            point_offsets=np.array([*points, self._in_link(last, end.place)]),
+            point_joints=(joint, last),
+            point_offsets=np.array([self._in_link(joint, place), self._in_link(last, end.place)]),
         )
         q = np.random.default_rng(0).uniform(chain.lower, chain.upper, (512, chain.n_joints))
         places, jacobians = chain.jacobians(q)
-        effect = np.zeros(len(self.joints))
-        for candidate in range(1, len(self.joints)):
-            way = places[:, -1] - places[:, candidate - 1]
-            way = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
-            change = jacobians[:, -1, :, candidate] - jacobians[:, candidate - 1, :, candidate]
-            effect[candidate] = np.abs(np.sum(way * change, axis=1)).mean()
+        way = places[:, 1] - places[:, 0]
+        way = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+        effect = np.abs(np.einsum("ni,nij->nj", way, jacobians[:, 1] - jacobians[:, 0])).mean(axis=0)
+        effect[: joint + 1] = 0.0
         if not effect.max() > 1e-6:
             raise EmbodimentError(
                 f"{self._tree.path.name}: no joint of the {self.side} arm ({', '.join(self.joints)}) bends it: its end "

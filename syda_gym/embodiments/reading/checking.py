@@ -225,9 +225,14 @@ class _Checker:
         return rest
 
     def _check_mimics(self, joints: dict[str, Joint]) -> None:
-        for name, joint in list(joints.items()):
-            if joint.mimic is not None and joint.mimic.joint not in joints:
-                self._notes.append(f"joint {name!r} mimics {joint.mimic.joint!r}, which is not there; it stands still")
+        lost = {
+            name: joint.mimic.joint
+            for name, joint in joints.items()
+            if joint.mimic is not None and joint.mimic.joint not in joints
+        }
+        if lost:
+            told = ", ".join(f"{name!r} of {leader!r}" for name, leader in lost.items())
+            self._notes.append(f"joints that mimic others that are not there stand still: {told}")
 
 
 _TENSOR = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
