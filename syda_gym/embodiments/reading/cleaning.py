@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -124,9 +125,13 @@ def _add_shape(etree: Any, part: Any, element: Any, shape: Shape) -> None:
 
 def origin_attributes(placement: Any) -> dict[str, str]:
     """``xyz`` and ``rpy`` of a homogeneous transform ``(4, 4)``."""
-    from scipy.spatial.transform import Rotation
-
-    rpy = Rotation.from_matrix(placement[:3, :3]).as_euler("xyz")
+    r = placement[:3, :3]
+    flat = math.hypot(r[0, 0], r[1, 0])
+    if flat > 1e-9:
+        roll, yaw = math.atan2(r[2, 1], r[2, 2]), math.atan2(r[1, 0], r[0, 0])
+    else:  # roll and yaw turn about one axis
+        roll, yaw = math.atan2(-r[1, 2], r[1, 1]), 0.0
+    rpy = (roll, math.atan2(-r[2, 0], flat), yaw)
     return {
         "xyz": " ".join(f"{float(v):.12g}" for v in placement[:3, 3]),
         "rpy": " ".join(f"{float(v):.12g}" for v in rpy),

@@ -8,6 +8,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from syda_gym.embodiments.reading.cleaning import origin_attributes
 from syda_gym.errors import EmbodimentError, MissingExtraError
 
 __all__ = ["urdf_of_mjcf"]
@@ -190,9 +191,9 @@ def _matrix(quaternion: Any) -> Any:
 
 
 def _rpy(rotation: Any) -> str:
-    from scipy.spatial.transform import Rotation
-
-    return _triple(Rotation.from_matrix(rotation).as_euler("xyz"))
+    place = np.eye(4)
+    place[:3, :3] = rotation
+    return origin_attributes(place)["rpy"]
 
 
 def _triple(values: Any) -> str:

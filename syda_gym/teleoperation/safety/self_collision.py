@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.kinematics.urdf import configuration, read_urdf
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
 from syda_gym.teleoperation.safety.clearance import Clearance
@@ -264,18 +265,15 @@ def _arm_model(robot: Robot) -> tuple[Any, Any]:
     """Pinocchio's model and collision shapes with every joint but the arms' locked at rest."""
     import pinocchio
 
-    model = pinocchio.buildModelFromUrdf(str(robot.urdf))
-    folders = [str(folder) for folder in robot.urdf.parents[:5]]
-    shapes = pinocchio.buildGeomFromUrdf(model, str(robot.urdf), pinocchio.GeometryType.COLLISION, package_dirs=folders)
-    configuration = pinocchio.neutral(model)
-    for name, angle in robot.description.rest.items():
-        if model.existJointName(name) and model.joints[model.getJointId(name)].nq == 1:
-            configuration[model.joints[model.getJointId(name)].idx_q] = angle
-    locked = [model.getJointId(name) for name in model.names if name not in ("universe", *robot.joint_names)]
+    tree = read_urdf(robot.urdf)
+    shapes = pinocchio.buildGeomFromUrdfString(tree.model, tree.xml, pinocchio.GeometryType.COLLISION)
+    still = {name: angle for name, angle in robot.description.rest.items() if name not in robot.joint_names}
+    kept_names = {"universe", *(tree.model_joints[name] for name in robot.joint_names)}
+    locked = [tree.model.getJointId(name) for name in tree.model.names if name not in kept_names]
     _join_capsules(shapes)
     for shape in shapes.geometryObjects:
         _convex(shape)
-    reduced, kept = pinocchio.buildReducedModel(model, shapes, locked, configuration)
+    reduced, kept = pinocchio.buildReducedModel(tree.model, shapes, locked, configuration(tree, still))
     return reduced, kept
 
 
@@ -319,8 +317,9 @@ def _convex(shape: Any) -> None:
 def _indices(model: Any, robot: Robot) -> tuple[list[int], list[tuple[int, int]]]:
     """Where each arm joint's angle goes in pinocchio's configuration, and which joints are continuous."""
     index, turns = [], []
+    names = read_urdf(robot.urdf).model_joints
     for column, name in enumerate(robot.joint_names):
-        joint = model.joints[model.getJointId(name)]
+        joint = model.joints[model.getJointId(names[name])]
         index.append(joint.idx_q)
         if joint.nq == 2:
             turns.append((column, joint.idx_q))
