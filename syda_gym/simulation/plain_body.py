@@ -57,10 +57,10 @@ class PlainBody:
     missing: int = 0
 
     @contextlib.contextmanager
-    def file(self, robot: Robot) -> Iterator[str]:
-        """A path to load from, as long as the context lasts."""
+    def file(self, own: str | os.PathLike[str]) -> Iterator[str]:
+        """A path to load from, as long as the context lasts: the robot's own file, or one for the moment."""
         if not self.xml:
-            yield str(robot.urdf)
+            yield os.fspath(own)
             return
         handle, path = tempfile.mkstemp(suffix=".urdf")
         try:
@@ -260,11 +260,11 @@ class _Writer:
         return {link: self._carriers[link] for link in found[:_MOST_APART]}
 
 
-def shapes_at_rest(robot: Robot) -> FloatArray:
+def shapes_at_rest(robot: Robot, tree: UrdfTree | None = None) -> FloatArray:
     """Corners of everything that a robot shows at rest, ``(N, 3)`` [m] in the body frame; link origins where no shape is."""
     from syda_gym.embodiments.reading.shapes import corners
 
-    tree = read_urdf(robot.urdf)
+    tree = tree or read_urdf(robot.urdf)
     angles = {**robot.description.rest, **dict(zip(robot.joint_names, robot.rest.tolist(), strict=True))}
     places = placements_at(tree, angles)
     inverse = np.linalg.inv(_body_frame(robot, tree, places))
@@ -316,6 +316,8 @@ def _inertial(mass: float, centre: FloatArray, tensor: FloatArray, least: bool =
     values, axes = np.linalg.eigh(0.5 * (tensor + tensor.T))
     if least:
         mass, values = max(mass, _LEAST_MASS), np.maximum(values, _LEAST_INERTIA)
+        lack = max(float(values[2] - values[0] - values[1]), 0.0)  # no body has such moments; PyBullet drops them all
+        values = values + np.array([0.51, 0.51, 0.0]) * lack
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] = -axes[:, 0]
     place = np.eye(4)

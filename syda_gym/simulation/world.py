@@ -204,7 +204,7 @@ class _Puppet:
         if plain.xml:
             flags |= pybullet.URDF_USE_INERTIA_FROM_FILE
         try:
-            with plain.file(robot) as path, quiet(robot.name):
+            with plain.file(robot.urdf) as path, quiet(robot.name):
                 body = pybullet.loadURDF(path, useFixedBase=True, flags=flags, physicsClientId=client)
         except pybullet.error as error:
             raise EmbodimentError(f"PyBullet cannot load {robot.urdf}: {error}; check the file") from error

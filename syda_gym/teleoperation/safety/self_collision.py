@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.embodiments.kinematics.urdf import configuration, read_urdf
+from syda_gym.embodiments.kinematics.urdf import UrdfTree, configuration, read_urdf
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
 from syda_gym.teleoperation.safety.clearance import Clearance
@@ -266,15 +267,24 @@ def _arm_model(robot: Robot) -> tuple[Any, Any]:
     import pinocchio
 
     tree = read_urdf(robot.urdf)
-    shapes = pinocchio.buildGeomFromUrdfString(tree.model, tree.xml, pinocchio.GeometryType.COLLISION)
+    shapes = _whole_shapes(tree)
     still = {name: angle for name, angle in robot.description.rest.items() if name not in robot.joint_names}
     kept_names = {"universe", *(tree.model_joints[name] for name in robot.joint_names)}
     locked = [tree.model.getJointId(name) for name in tree.model.names if name not in kept_names]
+    reduced, kept = pinocchio.buildReducedModel(tree.model, shapes, locked, configuration(tree, still))
+    return reduced, kept
+
+
+@lru_cache(maxsize=4)
+def _whole_shapes(tree: UrdfTree) -> Any:
+    """Collision shapes of a file, meshes as convex hulls; kept, because hulls take seconds and are asked for often."""
+    import pinocchio
+
+    shapes = pinocchio.buildGeomFromUrdfString(tree.model, tree.xml, pinocchio.GeometryType.COLLISION)
     _join_capsules(shapes)
     for shape in shapes.geometryObjects:
         _convex(shape)
-    reduced, kept = pinocchio.buildReducedModel(tree.model, shapes, locked, configuration(tree, still))
-    return reduced, kept
+    return shapes
 
 
 def _join_capsules(shapes: Any) -> None:
@@ -309,7 +319,10 @@ def _join_capsules(shapes: Any) -> None:
 def _convex(shape: Any) -> None:
     """Replaces a mesh by its convex hull, which is faster to check and never smaller."""
     if hasattr(shape.geometry, "buildConvexHull"):
-        shape.geometry.buildConvexHull(True, "Qt")
+        try:
+            shape.geometry.buildConvexHull(True, "Qt")
+        except RuntimeError:  # a mesh that has no volume stays as it is
+            return
         if shape.geometry.convex is not None:
             shape.geometry = shape.geometry.convex
 
