@@ -339,7 +339,9 @@ def _shape(shape: Shape, place: FloatArray, role: str | None = None) -> str:
         inner = f"<{shape.kind} {sizes}/>"
     color = ""
     if role == "visual":
-        rgba = " ".join(f"{v:.4g}" for v in shape.color or _GRAY)
+        seen = shape.color is not None and shape.color[3] > 0.0 and max(shape.color[:3]) > 0.05
+        # Black without light is a converter's default, and an invisible link is none to look at.
+        rgba = " ".join(f"{v:.4g}" for v in (shape.color if seen and shape.color else _GRAY))
         color = f'<material name="m{rgba.replace(" ", "_")}"><color rgba="{rgba}"/></material>'
     return f"<{role}>{_origin(place)}<geometry>{inner}</geometry>{color}</{role}>"
 
