@@ -27,7 +27,7 @@ NoCalibrationOption = Annotated[float, typer.Option(help="Seconds of standing; 0
 
 @robot_app.command("add")
 def _robot_add(
-    urdf: Annotated[Path, typer.Argument(help="Any URDF, with primitives or meshes.")],
+    urdf: Annotated[Path, typer.Argument(help="Any URDF (or xacro, MJCF, or a description of yours).")],
     name: Annotated[str | None, typer.Option(help="The new name; by default the file's.")] = None,
     left: Annotated[str | None, typer.Option(help="Link at the end of the left arm, if the search is wrong.")] = None,
     right: Annotated[str | None, typer.Option(help="Link at the end of the right arm.")] = None,
@@ -43,16 +43,22 @@ def _robot_add(
     added = add_robot(urdf, name, left=left, right=right, torso=torso, replace_existing=replace)
     _print_robot(added.robot)
     say = console()
-    degrees = math.degrees(added.pointing_error)
+    verdict = added.verdict
+    colour = {"good": "green", "fair": "yellow", "doubtful": "red"}[verdict.word]
     say.print(
-        f"it points its limbs as a person does within {degrees:.1f} degrees on average (poses in front and beside)"
+        f"[{colour}]{verdict.word}[/]: it points its limbs as a person does within {math.degrees(verdict.error):.1f} degrees "
+        f"on average (upper arms {math.degrees(verdict.upper):.1f}, forearms {math.degrees(verdict.fore):.1f})"
     )
+    if verdict.reason:
+        say.print(f"likely reason: {verdict.reason}", markup=False)
     for notice in added.notices:
         say.print(f"- {notice}", markup=False)
     say.print(f"description: [bold]{added.description}[/] (edit it if something is wrong)", soft_wrap=True)
     say.print(f"picture: [bold]{added.picture}[/] (the coloured arms must lie on the robot's)", soft_wrap=True)
     say.print(
-        f"try it: syda-gym teleop --robot {added.robot.name} --mapping geometric --sink video:{added.robot.name}.mp4"
+        f"try it: syda-gym teleop --robot {added.robot.name} --mapping geometric --action wave_side --seconds 8 "
+        f"--sink video:{added.robot.name}.mp4",
+        soft_wrap=True,
     )
     if suggest:
         from syda_gym.routes.suggestion import suggest as rank

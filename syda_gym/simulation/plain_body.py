@@ -25,7 +25,7 @@ from syda_gym.embodiments.reading.cleaning import origin_attributes, size_attrib
 from syda_gym.embodiments.reading.parts import Shape
 from syda_gym.embodiments.robot import Robot
 
-__all__ = ["BASE", "PlainBody", "disabled_pairs", "is_plain", "plain_body", "point_link", "shapes_at_rest"]
+__all__ = ["BASE", "PlainBody", "disabled_pairs", "is_plain", "plain_body", "point_link", "shapes_at_rest", "weak_joints"]
 
 BASE = "body_frame"
 _MOST_JOINTS = 127
@@ -363,6 +363,46 @@ def _stick(start: FloatArray, end: FloatArray, radius: float) -> list[str]:
         place[:3, 3] = at
         found.append(_shape(Shape("visual", "sphere", (radius,), place), place))
     return found
+
+
+def weak_joints(robot: Robot, frames: FloatArray | None = None) -> list[tuple[str, float, float]]:
+    """Joints whose stated effort is less than gravity alone asks for.
+
+    Args:
+        robot: whose arms.
+        frames: poses ``(N, n)`` [rad]; by default the arms stretched forward, where gravity asks most.
+
+    Returns:
+        Joint, the torque that holds it in the worst of the poses, and its effort [N m].
+    """
+    import pinocchio
+
+    from syda_gym.embodiments.limb_ik.solver import LimbIK
+
+    if frames is None:
+        frames = LimbIK.of(robot).solve(np.tile([1.0, 0.0, 0.0], (1, len(robot.sides), 2, 1)))
+    tree = read_urdf(robot.urdf)
+    writer = _Writer(robot, tree, (), looks=False)
+    down = np.array(writer._gravity())
+    names = [tree.model_joints[name] for name in robot.joint_names]
+    locked = [tree.model.getJointId(name) for name in tree.model.names if name not in ("universe", *names)]
+    model = pinocchio.buildReducedModel(tree.model, locked, configuration(tree, writer._rest))
+    model.gravity.linear = writer._body[:3, :3] @ down
+    data = model.createData()
+    worst = np.zeros(len(names))
+    for frame in frames:
+        q = pinocchio.neutral(model)
+        for name, angle in zip(names, frame.tolist(), strict=True):
+            joint = model.joints[model.getJointId(name)]
+            q[joint.idx_q : joint.idx_q + joint.nq] = [angle] if joint.nq == 1 else [np.cos(angle), np.sin(angle)]
+        torque = pinocchio.computeGeneralizedGravity(model, data, q)
+        found = [abs(float(torque[model.joints[model.getJointId(name)].idx_v])) for name in names]
+        worst = np.maximum(worst, found)
+    return [
+        (name, float(needed), float(effort))
+        for name, needed, effort in zip(robot.joint_names, worst, robot.effort, strict=True)
+        if needed > effort
+    ]
 
 
 def disabled_pairs(robot: Robot, body: PlainBody) -> list[tuple[str, str]]:
