@@ -52,7 +52,7 @@ def draw_robot(
     forward = np.array([[[[1.0, 0.3 * s, -0.4], [1.0, 0.0, 0.3]] for s in sides]])
     posed = LimbIK.of(robot).solve(forward)[0]
     poses = (("at rest", robot.rest, np.diff(robot.arm_points(robot.rest), axis=2)), ("arms forward", posed, forward))
-    figure = Figure(figsize=(13.0, 9.0), layout="constrained")
+    figure = Figure(figsize=(13.0, 9.0))
     FigureCanvasAgg(figure)
     grid = figure.subplots(len(poses), len(_VIEWS))
     for row, (name, angles, wanted) in zip(grid, poses, strict=True):
@@ -65,6 +65,8 @@ def draw_robot(
         for side, (upper, fore) in zip(robot.sides, robot.arm_lengths, strict=True)
     )
     head = f"{robot.name}: torso {robot.description.torso!r}, upper arm + forearm {lengths}"
+    # Fixed margins: a layout engine would draw everything twice.
+    figure.subplots_adjust(left=0.035, right=0.99, bottom=0.03, top=0.90, wspace=0.1, hspace=0.12)
     figure.suptitle(f"{head}\n{title}" if title else head, fontsize=11)
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=80, format="png")

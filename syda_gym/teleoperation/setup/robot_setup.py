@@ -168,6 +168,6 @@ def _hanging(robot: Robot) -> dict[str, float]:
         wanted = np.array([[[[0.1, spread * side, -1.0], [0.5, spread * side, -1.0]] for side in sides]])
         angles = solver.solve(wanted)[0]
         candidate = Robot(replace(robot.description, rest=dict(zip(robot.joint_names, angles.tolist(), strict=True))))
-        if not SelfCollision(candidate, margin=0.0).ignores_far_links():
+        if not SelfCollision(candidate, margin=0.0, samples=16).ignores_far_links():
             break
     return {name: round(float(angle), 4) for name, angle in zip(robot.joint_names, angles, strict=True)}
