@@ -239,7 +239,9 @@ def main() -> None:
     refused = [finding for finding in findings if finding.refused]
     if refused:
         text += "\nRefused, with the reason:\n\n"
-        text += "".join(f"- `{f.name}`: {f.refused.replace(str(robots[f.name].parent), '').lstrip('/')}\n" for f in refused)
+        text += "".join(
+            f"- `{f.name}`: {f.refused.replace(str(robots[f.name].parent), '').lstrip('/')}\n" for f in refused
+        )
     if arguments.table:
         write_text(arguments.table, text)
 

@@ -137,9 +137,7 @@ class _Reader:
 
     def refuse_unknown(self, allowed: set[str]) -> None:
         for key in set(self._data) - allowed:
-            raise EmbodimentError(
-                f"{self._where(str(key))}: unknown key {key!r}; {nearest_name(str(key), allowed)}"
-            )
+            raise EmbodimentError(f"{self._where(str(key))}: unknown key {key!r}; {nearest_name(str(key), allowed)}")
 
     def value(self, key: str, convert: Callable[[Any], Any], default: Any = None) -> Any:
         found = self._data.get(key)
@@ -148,7 +146,9 @@ class _Reader:
         try:
             return convert(found)
         except _WRONG as error:
-            raise EmbodimentError(f"{self._where(key)}: {key}: a wrong value or key: {_told(error)}; {_FORMAT}") from error
+            raise EmbodimentError(
+                f"{self._where(key)}: {key}: a wrong value or key: {_told(error)}; {_FORMAT}"
+            ) from error
 
     def rows(self, key: str, convert: Callable[[Any], Any]) -> tuple[Any, ...]:
         found = self._data.get(key)

@@ -25,7 +25,16 @@ from syda_gym.embodiments.reading.cleaning import origin_attributes, size_attrib
 from syda_gym.embodiments.reading.parts import Shape
 from syda_gym.embodiments.robot import Robot
 
-__all__ = ["BASE", "PlainBody", "disabled_pairs", "is_plain", "plain_body", "point_link", "shapes_at_rest", "weak_joints"]
+__all__ = [
+    "BASE",
+    "PlainBody",
+    "disabled_pairs",
+    "is_plain",
+    "plain_body",
+    "point_link",
+    "shapes_at_rest",
+    "weak_joints",
+]
 
 BASE = "body_frame"
 _MOST_JOINTS = 127
@@ -124,9 +133,7 @@ class _Writer:
         self._places = placements_at(tree, self._rest)
         self._carriers = _carriers(tree, robot.joint_names)
         self._body = _body_frame(robot, tree, self._places)
-        self._frames = [self._body @ np.eye(4)] + [
-            self._places[tree.joints[name].child] for name in robot.joint_names
-        ]
+        self._frames = [self._body @ np.eye(4)] + [self._places[tree.joints[name].child] for name in robot.joint_names]
         self._apart = self._find_apart() if "collision" in roles else {}
         self._missing = 0
 
@@ -146,9 +153,7 @@ class _Writer:
                 out.append(self._point(arm, point))
         for link in self._apart:
             out.append(self._apart_link(link))
-        return PlainBody(
-            "".join([*out, "</robot>"]), self._gravity(), None, tuple(points), self._apart, self._missing
-        )
+        return PlainBody("".join([*out, "</robot>"]), self._gravity(), None, tuple(points), self._apart, self._missing)
 
     def _joint(self, joint: int, name: str, link: str) -> str:
         robot = self._robot
@@ -224,9 +229,7 @@ class _Writer:
                     ends.append(self._places[link][:3, 3] + self._places[link][:3, :3] @ np.array(offset))
         start = np.zeros(3) if carrier >= 0 or not ends else frame[:3, :3] @ np.mean(ends, axis=0) + frame[:3, 3]
         return [
-            text
-            for end in ends
-            for text in _stick(start, frame[:3, :3] @ end + frame[:3, 3], 0.06 * self._robot.reach)
+            text for end in ends for text in _stick(start, frame[:3, :3] @ end + frame[:3, 3], 0.06 * self._robot.reach)
         ]
 
     def _inertias(self) -> list[tuple[float, FloatArray, FloatArray]]:

@@ -381,4 +381,3 @@ def _ids(known: dict[str, int], names: Sequence[str], robot: Robot, what: str) -
     if missing:
         raise EmbodimentError(f"{robot.urdf.name}: PyBullet knows no {what} {missing[0]!r}; it has {', '.join(known)}")
     return [known[name] for name in names]
-

@@ -27,6 +27,7 @@ from syda_gym.errors import EmbodimentError, nearest_name
 
 __all__ = ["Found", "discover", "discover_robot", "search"]
 
+
 @dataclass(frozen=True)
 class Found:
     """What a search found.
@@ -290,9 +291,7 @@ def _axes(tree: UrdfTree, placements: dict[str, FloatArray], arms: Sequence[ArmD
     for arm in arms:
         frame = placements[arm.shoulder]
         shoulders.append(frame[:3, 3] + frame[:3, :3] @ np.array(arm.point_offsets[0]))
-    middles = [
-        np.mean([placements[tree.joints[name].child][:3, 3] for name in arm.joints], axis=0) for arm in arms
-    ]
+    middles = [np.mean([placements[tree.joints[name].child][:3, 3] for name in arm.joints], axis=0) for arm in arms]
     return body_axes(tree, placements, shoulders, middles, find_limbs(tree, placements))
 
 

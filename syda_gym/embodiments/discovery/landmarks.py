@@ -77,9 +77,7 @@ def find_landmarks(
 class _Axes:
     """The axes of one arm at the zero pose, and what follows from where they lie."""
 
-    def __init__(
-        self, tree: UrdfTree, placements: dict[str, FloatArray], side: Side, joints: tuple[str, ...]
-    ) -> None:
+    def __init__(self, tree: UrdfTree, placements: dict[str, FloatArray], side: Side, joints: tuple[str, ...]) -> None:
         self.joints = joints
         self.side = side
         self.links = [tree.joints[name].child for name in joints]

@@ -119,7 +119,9 @@ def _without_leaves(tree: UrdfTree, below: dict[str, list[str]]) -> dict[str, li
     for children in below.values():
         onward = [child for child in children if _depth(below, child) >= 2 and not _HAND_JOINT.search(child)]
         ends = [child for child in children if not below[child] and not _is_side(tree, child)]
-        gears = [child for child in children if not below[child] and _GEAR.search(f"{child} {tree.joints[child].child}")]
+        gears = [
+            child for child in children if not below[child] and _GEAR.search(f"{child} {tree.joints[child].child}")
+        ]
         if len(onward) == 1:
             leaves.update(ends)
         if len(gears) < len(children):

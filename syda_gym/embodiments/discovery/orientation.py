@@ -69,9 +69,7 @@ def _up(
         return _across(z, left)
     # A model whose z points sideways and that has neither feet nor head: up is where the arms are, seen from the rest.
     inner = {name for limb in limbs for name in limb.joints}
-    body = [
-        placement[:3, 3] for link, placement in placements.items() if not inner & set(_road(tree, link))
-    ]
+    body = [placement[:3, 3] for link, placement in placements.items() if not inner & set(_road(tree, link))]
     rise = middle - np.mean(body, axis=0)
     rise = rise - left * float(left @ rise)
     if float(np.linalg.norm(rise)) < 1e-6:

@@ -261,5 +261,3 @@ def _nearest(name: str, links: dict[str, Any]) -> str:
     """The nearest link's name; a long list of all would hide the other faults."""
     told = nearest_name(name, links)
     return told.partition("? Known")[0] + "?" if told.startswith("did you mean") else "add it, or correct the name"
-
-

@@ -69,7 +69,8 @@ class _Writer:
         turning = [
             joint
             for joint in range(first, first + int(model.body_jntnum[body]))
-            if model.jnt_type[joint] in (self._mujoco.mjtJoint.mjJNT_HINGE, self._mujoco.mjtJoint.mjJNT_SLIDE)
+            if int(model.jnt_type[joint])
+            in (int(self._mujoco.mjtJoint.mjJNT_HINGE), int(self._mujoco.mjtJoint.mjJNT_SLIDE))
         ]
         name, at = self._bodies[body], np.zeros(3)
         if not turning:  # welded, floating, or a ball that nothing drives: it stands where it is
@@ -89,7 +90,7 @@ class _Writer:
 
     def _limits(self, joint: int) -> tuple[str, str]:
         model = self._model
-        slide = model.jnt_type[joint] == self._mujoco.mjtJoint.mjJNT_SLIDE
+        slide = int(model.jnt_type[joint]) == int(self._mujoco.mjtJoint.mjJNT_SLIDE)
         axis = f'<axis xyz="{_triple(model.jnt_axis[joint])}"/>'
         force = self._effort(joint)
         effort = f' effort="{force:.9g}"' if force else ""
@@ -107,7 +108,7 @@ class _Writer:
         """Largest force of the actuators on a joint [N m], 0 if unknown."""
         model, found = self._model, 0.0
         for actuator in range(model.nu):
-            on_joint = model.actuator_trntype[actuator] == self._mujoco.mjtTrn.mjTRN_JOINT
+            on_joint = int(model.actuator_trntype[actuator]) == int(self._mujoco.mjtTrn.mjTRN_JOINT)
             if not on_joint or int(model.actuator_trnid[actuator, 0]) != joint:
                 continue
             gear = abs(float(model.actuator_gear[actuator, 0]))
@@ -120,7 +121,8 @@ class _Writer:
     def _mimic(self, joint: int) -> str:
         model = self._model
         for row in range(model.neq):
-            coupled = model.eq_type[row] == self._mujoco.mjtEq.mjEQ_JOINT and int(model.eq_obj1id[row]) == joint
+            kind = int(self._mujoco.mjtEq.mjEQ_JOINT)
+            coupled = int(model.eq_type[row]) == kind and int(model.eq_obj1id[row]) == joint
             if coupled and int(model.eq_obj2id[row]) >= 0:
                 leader = quoteattr(self._joints[int(model.eq_obj2id[row])])
                 offset, slope = (float(v) for v in model.eq_data[row, :2])
@@ -150,18 +152,18 @@ class _Writer:
 
     def _write_geom(self, geom: int, shift: Any) -> None:
         model, kinds = self._model, self._mujoco.mjtGeom
-        kind, size = model.geom_type[geom], model.geom_size[geom]
+        kind, size = int(model.geom_type[geom]), model.geom_size[geom]
         centre, rotation = shift + model.geom_pos[geom], _matrix(model.geom_quat[geom])
-        if kind == kinds.mjGEOM_SPHERE:
+        if kind == int(kinds.mjGEOM_SPHERE):
             shapes = [(f'<sphere radius="{size[0]:.6g}"/>', np.zeros(3))]
-        elif kind in (kinds.mjGEOM_CYLINDER, kinds.mjGEOM_CAPSULE):
+        elif kind in (int(kinds.mjGEOM_CYLINDER), int(kinds.mjGEOM_CAPSULE)):
             shapes = [(f'<cylinder radius="{size[0]:.6g}" length="{2.0 * size[1]:.6g}"/>', np.zeros(3))]
-            if kind == kinds.mjGEOM_CAPSULE:  # URDF writes a capsule as a cylinder between two spheres
+            if kind == int(kinds.mjGEOM_CAPSULE):  # URDF writes a capsule as a cylinder between two spheres
                 ball = f'<sphere radius="{size[0]:.6g}"/>'
                 shapes += [(ball, np.array([0.0, 0.0, sign * size[1]])) for sign in (1.0, -1.0)]
-        elif kind in (kinds.mjGEOM_BOX, kinds.mjGEOM_ELLIPSOID):
+        elif kind in (int(kinds.mjGEOM_BOX), int(kinds.mjGEOM_ELLIPSOID)):
             shapes = [(f'<box size="{_triple(2.0 * size)}"/>', np.zeros(3))]
-        elif kind == kinds.mjGEOM_MESH:
+        elif kind == int(kinds.mjGEOM_MESH):
             middle, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
             shapes = [(f'<box size="{_triple(2.0 * half)}"/>', middle)]
         else:

@@ -125,7 +125,9 @@ class _Drawn:
             axis.plot(bone[:, across], bone[:, up], color="0.55", lw=0.8, marker=".", ms=2, zorder=2)
         if across == 1 or up != 0:
             for bone in self._person:
-                axis.plot(bone[:, across], bone[:, up], color=_PERSON, lw=2.0, alpha=0.8, solid_capstyle="round", zorder=1)
+                axis.plot(
+                    bone[:, across], bone[:, up], color=_PERSON, lw=2.0, alpha=0.8, solid_capstyle="round", zorder=1
+                )
         self._draw_arms(axis, across, up)
         axis.plot(0.0, 0.0, marker="+", ms=9, color="k", zorder=5)
         if up == 0:

@@ -154,7 +154,9 @@ def _found(
     found = search(urdf, name=name, left=left, right=right, torso=torso)
     notes = list(found.notes)
     if found.left_out:
-        told = ", ".join(found.left_out[:8]) + (f" and {len(found.left_out) - 8} more" if len(found.left_out) > 8 else "")
+        told = ", ".join(found.left_out[:8]) + (
+            f" and {len(found.left_out) - 8} more" if len(found.left_out) > 8 else ""
+        )
         notes.append(f"joints on the arms that are not moved: {told}")
     return found.description, notes
 
