@@ -46,8 +46,9 @@ def _robot_add(
     verdict = added.verdict
     colour = {"good": "green", "fair": "yellow", "doubtful": "red"}[verdict.word]
     say.print(
-        f"[{colour}]{verdict.word}[/]: it points its limbs as a person does within {math.degrees(verdict.error):.1f} degrees "
-        f"on average (upper arms {math.degrees(verdict.upper):.1f}, forearms {math.degrees(verdict.fore):.1f})"
+        f"[{colour}]{verdict.word}[/]: it points its limbs as a person does within "
+        f"{math.degrees(verdict.error):.1f} degrees on average (upper arms "
+        f"{math.degrees(verdict.upper):.1f}, forearms {math.degrees(verdict.fore):.1f})"
     )
     if verdict.reason:
         say.print(f"likely reason: {verdict.reason}", markup=False)

@@ -1,9 +1,9 @@
 """plain_body: a robot as PyBullet simulates it faithfully: one link per arm joint, all else part of what carries it.
 
 PyBullet gives a link without ``<inertial>`` one kilogram, knows no ``<mimic>``, takes 127 joints, places a root by its
-centre of mass and stops at a missing mesh. So a robot is written anew for it: the base is the body frame itself (x forward,
-y left, z up), joints that are no arm joints stand at rest, masses and inertias are summed up by pinocchio, and every
-landmark is a link of its own. A file in which nothing of this would matter is loaded as it is.
+centre of mass and stops at a missing mesh. So a robot is written anew for it: the base is the body frame itself
+(x forward, y left, z up), joints that are no arm joints stand at rest, masses and inertias are summed up by pinocchio,
+and every landmark is a link of its own. A file in which nothing of this would matter is loaded as it is.
 """
 
 from __future__ import annotations
@@ -264,7 +264,7 @@ class _Writer:
 
 
 def shapes_at_rest(robot: Robot, tree: UrdfTree | None = None) -> FloatArray:
-    """Corners of everything that a robot shows at rest, ``(N, 3)`` [m] in the body frame; link origins where no shape is."""
+    """Corners of everything that a robot shows at rest, ``(N, 3)`` [m] in the body frame; link origins too."""
     from syda_gym.embodiments.reading.shapes import corners
 
     tree = tree or read_urdf(robot.urdf)

@@ -154,8 +154,8 @@ def _notes(tree: UrdfTree, arms: Sequence[ArmDescription], chosen: dict[Side, tu
     unknown = [name for name in tree.placeholders if name in used]
     if unknown:
         notes.append(
-            f"the efforts or speeds stated for {', '.join(unknown)} are placeholders that no motor has (such as 0, -1 or "
-            "1e9); taken as unknown"
+            f"the efforts or speeds stated for {', '.join(unknown)} are placeholders that no motor has (such as 0, "
+            "-1 or 1e9); taken as unknown"
         )
     return notes
 
@@ -185,7 +185,7 @@ def _prismatic_reason(tree: UrdfTree, joints: Sequence[str], chosen: dict[Side, 
     if not sliding:
         return ""
     names = ", ".join(sliding)
-    return f". It hangs on the prismatic joints {names}, which slide and are not driven: arms here are made of turning joints"
+    return f". It hangs on the prismatic joints {names}, which slide and are not driven: arms are made of turning ones"
 
 
 def _refuse_cut_arms(tree: UrdfTree, chosen: dict[Side, tuple[str, ...]]) -> None:
@@ -203,8 +203,9 @@ def _refuse_cut_arms(tree: UrdfTree, chosen: dict[Side, tuple[str, ...]]) -> Non
         named = [name for name in turns if kind_by_name([name, tree.joints[name].child]) == "arm"]
         if slides and (named or (len(chosen) > 1 and turns)):
             raise EmbodimentError(
-                f"{tree.path.name}: the {side} arm has the prismatic joint {slides[0]!r} between {(named or turns)[0]!r} "
-                f"and {joints[0]!r}; arms are made of turning joints. Make it fixed, or name arms without it"
+                f"{tree.path.name}: the {side} arm has the prismatic joint {slides[0]!r} between "
+                f"{(named or turns)[0]!r} and {joints[0]!r}; arms are made of turning joints. "
+                "Make it fixed, or name arms without it"
             )
 
 

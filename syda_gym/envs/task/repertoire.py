@@ -187,8 +187,8 @@ def _body(motions: Motions, body: object, what: str, *, needed: bool = True) -> 
         return found
     if needed and what == "robot" and (isinstance(body, Embodiment) or name in catalog.names()):
         raise EmbodimentError(
-            f"robot={name!r}: {motions.name} has no motion of it; pass reference='mapped' to track what the mapping makes of "
-            "the operator"
+            f"robot={name!r}: {motions.name} has no motion of it; pass reference='mapped' to track what the mapping "
+            "makes of the operator"
         )
     if needed:
         raise EmbodimentError(

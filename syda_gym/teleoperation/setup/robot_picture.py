@@ -1,4 +1,4 @@
-"""A picture of what was found in a robot: its shapes, the proposed landmarks, joints used and left out, and a person."""
+"""A picture of what was found in a robot: shapes, proposed landmarks, joints used and left out, and a person."""
 
 from __future__ import annotations
 
