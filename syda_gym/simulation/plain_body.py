@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -22,7 +22,7 @@ from syda_gym.embodiments.description import POINTS
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.kinematics.urdf import UrdfTree, configuration, placements_at, read_urdf
 from syda_gym.embodiments.reading.cleaning import origin_attributes, size_attributes
-from syda_gym.embodiments.reading.parts import Shape
+from syda_gym.embodiments.reading.parts import Joint, Shape
 from syda_gym.embodiments.robot import Robot
 
 __all__ = [
@@ -92,7 +92,7 @@ def is_plain(robot: Robot, tree: UrdfTree) -> bool:
     with_mass = tree.xml.count("<inertial>")
     plain_shapes = all(shape.kind != "mesh" for shapes in tree.shapes.values() for shape in shapes)
     plain_joints = all(
-        joint.type in ("revolute", "fixed") and joint.mimic is None and joint.name not in links
+        joint.type in ("revolute", "fixed") and joint.name not in links and _follows(joint, robot.description.rest)
         for joint in tree.joints.values()
     )
     return (
