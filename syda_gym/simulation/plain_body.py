@@ -108,6 +108,14 @@ def is_plain(robot: Robot, tree: UrdfTree) -> bool:
     )
 
 
+def _follows(joint: Joint, rest: Mapping[str, float]) -> bool:
+    """Whether a joint's rest angle is what its leader's asks for, so that PyBullet need not know that it follows."""
+    mimic = joint.mimic
+    if mimic is None:
+        return True
+    return abs(rest.get(joint.name, 0.0) - mimic.multiplier * rest.get(mimic.joint, 0.0) - mimic.offset) < 1e-6
+
+
 def plain_body(robot: Robot, roles: Sequence[str] = (), tree: UrdfTree | None = None) -> PlainBody:
     """Writes a robot for PyBullet.
 
