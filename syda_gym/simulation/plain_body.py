@@ -92,7 +92,7 @@ def is_plain(robot: Robot, tree: UrdfTree) -> bool:
     with_mass = tree.xml.count("<inertial>")
     plain_shapes = all(shape.kind != "mesh" for shapes in tree.shapes.values() for shape in shapes)
     plain_joints = all(
-        joint.type in ("revolute", "fixed") and joint.name not in links and _follows(joint, robot.description.rest)
+        joint.type in ("revolute", "fixed") and _follows(joint, robot.description.rest)
         for joint in tree.joints.values()
     )
     return (
