@@ -51,9 +51,7 @@ def _robot_add(
         say.print(f"- {notice}", markup=False)
     say.print(f"description: [bold]{added.description}[/] (edit it if something is wrong)", soft_wrap=True)
     say.print(f"picture: [bold]{added.picture}[/] (the coloured arms must lie on the robot's)", soft_wrap=True)
-    say.print(
-        f"try it: syda-gym teleop --robot {added.robot.name} --mapping geometric --sink video:{added.robot.name}.mp4"
-    )
+    say.print(f"try it: syda-gym teleop --robot {added.robot.name} --sink video:{added.robot.name}.mp4")
     if suggest:
         from syda_gym.routes.suggestion import suggest as rank
 
@@ -116,11 +114,17 @@ def teleop(
         typer.Option(help="`bullet`, `window`, `video:FILE.mp4`, `udp:HOST:PORT`, `naoqi:URL` or `none`; repeatable."),
     ] = None,
     mapping: Annotated[
-        str, typer.Option(help="A method, `geometric` (needs no recordings), a stored mapping, or a folder of them.")
-    ] = "syda",
+        str,
+        typer.Option(
+            help="`auto`, a method, `geometric` (needs no recordings), a stored mapping, or a folder of them."
+        ),
+    ] = "auto",
     preset: Annotated[str | None, typer.Option(help="Preset of the method.")] = None,
     route: Annotated[str, typer.Option(help="`auto`, or bodies such as `adult,kid,pepper`.")] = "auto",
-    motions: Annotated[str, typer.Option("--motions", "-m", help="What is fitted on.", metavar="SPEC")] = "embedded",
+    motions: Annotated[
+        str | None,
+        typer.Option("--motions", "-m", help="What is fitted on; by default what you recorded.", metavar="SPEC"),
+    ] = None,
     action: Annotated[list[str] | None, typer.Option(help="Action that a replay plays; repeatable.")] = None,
     speed: Annotated[float, typer.Option(help="Speed of a replay.")] = 1.0,
     repeat: Annotated[bool, typer.Option("--repeat", help="A replay begins again at its end.")] = False,
@@ -195,7 +199,9 @@ def teleop(
 
 
 def record(
-    out: Annotated[Path, typer.Argument(help="Folder of the new data set.")],
+    out: Annotated[
+        Path | None, typer.Argument(help="Folder of the new data set; by default where `fit` and `teleop` look.")
+    ] = None,
     operator: OperatorOption = "adult",
     robot: Annotated[str, typer.Option(help="Who plays the prompts: a robot's name.")] = "pepper",
     prompts: Annotated[str, typer.Option(help="Motions of the robot to play.", metavar="SPEC")] = "embedded",
@@ -214,11 +220,13 @@ def record(
     from rich.table import Table
 
     from syda_gym.motions import write_dataset
+    from syda_gym.motions.recordings import new_recording
     from syda_gym.teleoperation.addresses import make_sink, make_source, read_token
     from syda_gym.teleoperation.setup.record_session import RecordingOptions, choose_prompts, record_session
 
     say = console()
     clips, leader = choose_prompts(prompts, robot, operator, actions=action or (), takes=takes)
+    out = out or new_recording(leader.name, clips[0].body.name)
     token = read_token(token_file)
     listener = make_source(source, leader, token=token, calibration=calibration)
     options = RecordingOptions(calibration=calibration, axes=axes, countdown=countdown)
@@ -236,7 +244,9 @@ def record(
     say.print(table)
     for recording, reason in session.left_out.items():
         say.print(f"- {recording} left out: {reason}", markup=False)
-    say.print(f"written: [bold]{out}[/]; check it: syda-gym motions check {out}", soft_wrap=True)
+    say.print(
+        f"written: [bold]{out}[/]; check it: syda-gym motions check {out}, then: syda-gym fit {out}", soft_wrap=True
+    )
 
 
 class _Screen:
