@@ -28,6 +28,8 @@ from typing import Any
 
 import numpy as np
 
+import syda_gym
+from syda_gym import unfitted
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
@@ -36,8 +38,6 @@ from syda_gym.files import read_json, write_json
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.motions.clip import MotionClip
 from syda_gym.motions.loading import load_motions
-import syda_gym
-from syda_gym import unfitted
 from syda_gym.routes.choice import choose_mapping
 from syda_gym.teleoperation import LoopSettings, TeleoperationLoop, Tick, UdpSink, UdpSource, run
 from syda_gym.teleoperation.incoming.inbox import Inbox

@@ -178,7 +178,7 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     | ``held_out`` | ``()`` | actions that no mapping may be fitted on |
     | ``via`` | ``None`` | bodies that routes may pass; the paper's adult, kid, pepper by default |
     | ``fit_seed`` | ``0`` | seed of fits |
-    | ``reference`` | ``"auto"`` | ``paired`` (the robot's own motion) where there is one, else ``mapped`` (what the mapping asks for) |
+    | ``reference`` | ``"auto"`` | ``paired`` (the robot's own motion) where there is one, else ``mapped`` |
     | ``action_mode`` | ``"residual"`` | or ``position`` |
     | ``residual_scale`` | ``0.25`` | correction at action 1 [rad] |
     | ``preview``, ``history`` | ``0``, ``0`` | future and past frames in the observation |

@@ -94,8 +94,8 @@ def joined(parts: Sequence[Motions], name: str) -> Motions:
         for body_name, body in part.bodies.items():
             if bodies.setdefault(body_name, body) != body:
                 raise MotionError(
-                    f"{part.name}: its body {body_name!r} differs from that of {parts[0].name}; recordings of different "
-                    "people or robots cannot be joined under one name: record or convert with one body"
+                    f"{part.name}: its body {body_name!r} differs from that of {parts[0].name}; recordings of "
+                    "different people or robots cannot be joined under one name: record or convert with one body"
                 )
     takes = [
         replace(take, recording=f"{number}:{part.name}/{take.recording}")

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.errors import OptionError
+from syda_gym.errors import OptionError, nearest_name
 from syda_gym.mappings.coded_mapping import CodedMapping
 from syda_gym.mappings.coding.window_coder import WindowCoder
 from syda_gym.mappings.methods.arm_problem import (
@@ -59,9 +59,9 @@ def fit_general(jobs: Sequence[FitJob], progress: Progress | None = None) -> lis
     """
     defaults = {"lag": _LAG, "window": 0, "confidence": True, "shrinkage": None, "hop_shrinkage": None}
     own, unknown = take_options(jobs[0].options, defaults)
-    if unknown:
+    for name in unknown:
         raise OptionError(
-            f"unknown options {sorted(unknown)}; known: {', '.join(defaults)}. Networks have more: preset='synergies'"
+            f"unknown option {name!r}; {nearest_name(name, defaults)}. Networks have others, see preset='synergies'"
         )
 
     def fitter(problems: Sequence[ArmProblem]) -> list[Regressor]:
