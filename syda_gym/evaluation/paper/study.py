@@ -28,7 +28,7 @@ __all__ = ["CONTENDERS", "Cell", "Contender", "reproduce"]
 Progress = Callable[[float, str], None]
 """Told the finished fraction and what was finished."""
 
-_FORMAT = 2
+_FORMAT = 3
 
 
 def reproduce(

@@ -1,18 +1,21 @@
 """The ``general`` preset, the default: a geometric prior, and what a pair's recordings add to it.
 
 The image of a limb is its direction after one rotation; that needs no recording. What two bodies do differently is
-learned on top of it, as a ridge of what the image leaves over, both ways. With few actions the ridge is shrunk hard, so
-that one action cannot spoil what geometry knows; from three actions on each way chooses its penalty among its training
-actions.
+learned on top of it, as a ridge of what the image leaves over, both ways. With one or two actions the ridge is shrunk
+hard, so that they cannot spoil what geometry knows. From three on six penalties are judged on training actions held out
+in turn, from five on also without the image (enough actions may know better than geometry), and the mapping is the mean
+of these candidates, weighed by how well each can be told from the best: nine actions cannot say which is right, and a
+mean does not have to know.
 
 It is SyDa's linear case in closed form. A linear dual autoencoder with the cross losses A-to-B and B-to-A, whose inputs
 carry noise of s standard deviations, has ridges with penalty s^2 as its optimum (Bishop 1995); the synergies are the
-singular directions of the correction. ``docs/mappings.md`` holds what training it step by step gave instead.
+singular directions of the map. ``docs/mappings.md`` says what training such networks step by step gave instead.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -44,10 +47,11 @@ SHRINKAGES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 """Candidates for the penalty of a correction, weakest first; fixed in advance."""
 
 FEW_SHRINKAGE = 3.0
-"""The penalty where fewer than three actions leave nothing to choose by."""
+"""The penalty where fewer than three actions leave nothing to judge by."""
 
 _LAG = 6
 _LEAN = 0.1
+_FREE_ACTIONS = 5
 
 
 def fit_general(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
@@ -55,7 +59,7 @@ def fit_general(jobs: Sequence[FitJob], progress: Progress | None = None) -> lis
 
     Options: ``lag`` (largest lag searched for, 6 frames), ``window`` (past frames that a human's code shows, 0),
     ``confidence`` (hold actions out for the error bound, true), ``shrinkage`` (of the correction; 3 below three
-    actions, else chosen among the training actions), ``hop_shrinkage`` (likewise, of a hop).
+    actions, else a mean over candidates), ``hop_shrinkage`` (likewise, of a hop).
     """
     defaults = {"lag": _LAG, "window": 0, "confidence": True, "shrinkage": None, "hop_shrinkage": None}
     own, unknown = take_options(jobs[0].options, defaults)
@@ -82,36 +86,60 @@ def fit_general(jobs: Sequence[FitJob], progress: Progress | None = None) -> lis
 def _corrected(problem: ArmProblem, shrinkage: float | None) -> PriorRegressor:
     """Rotation and both corrections; the way back takes the robot's frames as recorded, lag and all."""
     source, target = problem.main
-    shares = upper_share(problem.source_coder), upper_share(problem.target_coder)
-    prior = _image(_flat(source), _flat(target), *shares)
-    ends = problem.source_coder, problem.target_coder
-    there = _correction(problem.pair, source, target, prior, ends[1], shares, shrinkage)
-    back = _correction(problem.pair, *problem.main_back, prior.inverse(), _current(ends[0]), shares[::-1], shrinkage)
-    return PriorRegressor(prior, there, back)
+    lengths = upper_share(problem.source_coder), upper_share(problem.target_coder)
+    prior = _image(_flat(source), _flat(target), *lengths)
+    there, kept = _correction(_Way(problem.pair, source, target, problem.target_coder, *lengths), prior, shrinkage)
+    back, kept_back = _correction(
+        _Way(problem.pair, *problem.main_back, _current(problem.source_coder), *lengths[::-1]),
+        prior.inverse(),
+        shrinkage,
+    )
+    return PriorRegressor(prior, there, back, (kept, kept_back))
 
 
-def _correction(
-    pair: PairedMotions,
-    source: FloatArray,
-    target: FloatArray,
-    prior: GeometricRegressor,
-    coder: ArmCoder,
-    shares: tuple[float, float],
-    shrinkage: float | None,
-) -> Ridge:
-    """The ridge of what the geometric image leaves over, one way."""
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """One direction: codes of both ends ``(N, K, D)`` and ``(N, K, E)``, the output's coder, upper arms' shares."""
 
-    def candidates(x: FloatArray, y: FloatArray, new: FloatArray) -> list[FloatArray]:
-        image = _image(x, y, *shares)
-        return [image(new) + ridge(new) for ridge in Ridge.path(x, y - image(x), SHRINKAGES)]
+    pair: PairedMotions
+    source: FloatArray
+    target: FloatArray
+    coder: ArmCoder
+    source_share: float
+    target_share: float
 
-    if shrinkage is None:
-        errors = held_out_gaps(pair, source, target, coder, candidates)
-        chosen = FEW_SHRINKAGE if errors is None else SHRINKAGES[int(np.argmin(errors.mean(axis=1)))]
-    else:
-        chosen = float(shrinkage)
-    x, y = (thinned(codes) for codes in (source, target))
-    return Ridge.path(x, y - prior(x), [chosen])[0]
+
+def _correction(way: _Way, prior: GeometricRegressor, shrinkage: float | None) -> tuple[Ridge, float]:
+    """The ridge of what the geometric image leaves over, and the share of the image that is kept."""
+
+    def predict(x: FloatArray, y: FloatArray, new: FloatArray) -> list[FloatArray]:
+        image = _image(x, y, way.source_share, way.target_share)
+        kept = [image(new) + ridge(new) for ridge in Ridge.path(x, y - image(x), SHRINKAGES)]
+        return [*kept, *(ridge(new) for ridge in Ridge.path(x, y, SHRINKAGES))] if free else kept
+
+    free = len(way.pair.action_names) >= _FREE_ACTIONS
+    x, y = thinned(way.source), thinned(way.target)
+    errors = None if shrinkage is not None else held_out_gaps(way.pair, way.source, way.target, way.coder, predict)
+    if errors is None:
+        chosen = FEW_SHRINKAGE if shrinkage is None else float(shrinkage)
+        return Ridge.path(x, y - prior(x), [chosen])[0], 1.0
+    weights = _weights(errors)
+    models = Ridge.path(x, y - prior(x), SHRINKAGES)
+    if free:
+        models += Ridge.path(x, y, SHRINKAGES)
+    return Ridge.mean(models, weights.tolist()), float(weights[: len(SHRINKAGES)].sum())
+
+
+def _weights(errors: FloatArray) -> FloatArray:
+    """Weights of candidates, adding up to one, from errors ``(candidates, groups)`` on held-out actions.
+
+    A candidate's weight is that of a normal density at its distance from the best, in standard errors of that distance
+    over actions.
+    """
+    behind = errors - errors[np.argmin(errors.mean(axis=1))]
+    standard_error = behind.std(axis=1, ddof=1) / np.sqrt(errors.shape[1])
+    weights: FloatArray = np.exp(-0.5 * (behind.mean(axis=1) / np.maximum(standard_error, 1e-12)) ** 2)
+    return weights / weights.sum()
 
 
 def _image(source: FloatArray, target: FloatArray, source_share: float, target_share: float) -> GeometricRegressor:

@@ -90,6 +90,13 @@ class Ridge(Regressor):
         return models
 
     @classmethod
+    def mean(cls, models: Sequence[Ridge], weights: Sequence[float]) -> Ridge:
+        """The weighted mean of models with the inputs of one ``path``, as one model."""
+        weight: FloatArray = sum(share * model.weight for share, model in zip(weights, models, strict=True))  # type: ignore[assignment]
+        bias: FloatArray = sum(share * model.bias for share, model in zip(weights, models, strict=True))  # type: ignore[assignment]
+        return cls(models[0].scale, weight, bias)
+
+    @classmethod
     def _weighted(
         cls, scale: Scaler, inputs: FloatArray, target: FloatArray, shrinkage: float, weights: FloatArray
     ) -> Ridge:

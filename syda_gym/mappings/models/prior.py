@@ -17,37 +17,45 @@ __all__ = ["PriorRegressor"]
 class PriorRegressor(Regressor):
     """What geometry says of a code, and what recordings add to it.
 
-    ``y = R directions(x) + correction(x)`` and, on the way back, ``x = shape(R' directions(y)) + correction_back(y)``.
-    The corrections were fitted to what the geometric image leaves over, so that one of zero leaves the geometric
-    mapping itself.
+    ``y = share R directions(x) + correction(x)`` and, on the way back, ``x = share_back shape(R' directions(y)) +
+    correction_back(y)``. The corrections were fitted to what the share of the geometric image leaves over; a whole
+    share and no correction are the geometric mapping itself.
 
     Args:
         prior: the geometric image.
         correction: of the target's code, from the source's.
         correction_back: of the source's code, from the target's.
+        shares: how much of the image is kept, 0 to 1, there and back.
     """
 
     kind = "prior"
 
-    def __init__(self, prior: GeometricRegressor, correction: Ridge, correction_back: Ridge) -> None:
+    def __init__(
+        self,
+        prior: GeometricRegressor,
+        correction: Ridge,
+        correction_back: Ridge,
+        shares: tuple[float, float] = (1.0, 1.0),
+    ) -> None:
         self.prior = prior
         self.correction = correction
         self.correction_back = correction_back
+        self.shares = (float(shares[0]), float(shares[1]))
 
     def __call__(self, codes: FloatArray) -> FloatArray:
         """Geometric image plus correction."""
-        image: FloatArray = self.prior(codes) + self.correction(codes)
+        image: FloatArray = self.shares[0] * self.prior(codes) + self.correction(codes)
         return image
 
     def affine(self) -> Affine:
         """Both as one affine map."""
         slope, offset = self.correction.affine()
-        images = self.prior(np.eye(len(slope)))
+        images = self.shares[0] * self.prior(np.eye(len(slope)))
         return images + slope, offset
 
     def inverse(self) -> PriorRegressor:
         """The rotation back with the correction of the way back."""
-        return PriorRegressor(self.prior.inverse(), self.correction_back, self.correction)
+        return PriorRegressor(self.prior.inverse(), self.correction_back, self.correction, self.shares[::-1])
 
     def arrays(self) -> Arrays:
         """The rotation and both corrections."""
@@ -59,8 +67,8 @@ class PriorRegressor(Regressor):
         return {f"{name}/{key}": value for name, part in parts for key, value in part.arrays().items()}
 
     def settings(self) -> dict[str, Any]:
-        """Those of the geometric image."""
-        return self.prior.settings()
+        """Those of the geometric image, and the shares."""
+        return {**self.prior.settings(), "shares": list(self.shares)}
 
     @classmethod
     def restore(cls, settings: dict[str, Any], arrays: Arrays) -> PriorRegressor:
@@ -73,4 +81,5 @@ class PriorRegressor(Regressor):
             GeometricRegressor.restore(settings, below("prior")),
             Ridge.restore({}, below("there")),
             Ridge.restore({}, below("back")),
+            (float(settings["shares"][0]), float(settings["shares"][1])),
         )
