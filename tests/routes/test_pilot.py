@@ -189,19 +189,3 @@ def test_a_pilot_may_pass_bodies_that_are_no_names(home: Path) -> None:
     assert mapping.source == taller
     assert mapping.preset == "unfitted"
     assert pilot.fitted == (("taller", "pepper"),)
-
-
-def test_the_command_prints_what_each_action_gained(home: Path, tmp_path: Path) -> None:
-    from typer.testing import CliRunner
-
-    from syda_gym.cli.main import app
-
-    write_dataset(session("adult", "pepper", actions=3), tmp_path / "data")
-    result = CliRunner().invoke(app, ["fit", str(tmp_path / "data")])
-    assert result.exit_code == 0, result.output
-    assert "0 (unfitted)" in result.output
-    assert "error bound on unseen actions" in result.output
-    as_json = CliRunner().invoke(app, ["fit", str(tmp_path / "data"), "--json", "--out", str(tmp_path / "mine")])
-    assert [row["actions"] for row in json.loads(as_json.stdout)["rows"]] == [0, 1, 2]
-    assert (tmp_path / "mine.safetensors").is_file()
-    assert CliRunner().invoke(app, ["fit", str(tmp_path / "data"), "--from", "adult"]).exit_code != 0
