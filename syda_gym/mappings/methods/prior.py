@@ -138,8 +138,9 @@ def _weights(errors: FloatArray) -> FloatArray:
     """
     behind = errors - errors[np.argmin(errors.mean(axis=1))]
     standard_error = behind.std(axis=1, ddof=1) / np.sqrt(errors.shape[1])
-    weights: FloatArray = np.exp(-0.5 * (behind.mean(axis=1) / np.maximum(standard_error, 1e-12)) ** 2)
-    return weights / weights.sum()
+    densities: FloatArray = np.exp(-0.5 * (behind.mean(axis=1) / np.maximum(standard_error, 1e-12)) ** 2)
+    weights: FloatArray = densities / densities.sum()
+    return weights
 
 
 def _image(source: FloatArray, target: FloatArray, source_share: float, target_share: float) -> GeometricRegressor:
