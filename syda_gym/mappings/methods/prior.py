@@ -1,8 +1,8 @@
 """The ``general`` preset, the default: a geometric prior, and what a pair's recordings add to it.
 
 The image of a limb is its direction after one rotation; that needs no recording. What two bodies do differently is
-learned on top of it, as a ridge of what the image leaves over, both ways. With one or two actions the ridge is shrunk
-hard, so that they cannot spoil what geometry knows. From three on six penalties are judged on training actions held out
+learned on top of it, as a ridge of what the image leaves over, both ways. With up to three actions the ridge is shrunk
+hard, so that they cannot spoil what geometry knows. From four on six penalties are judged on training actions held out
 in turn, from five on also without the image (enough actions may know better than geometry), and the mapping is the mean
 of these candidates, weighed by how well each can be told from the best: nine actions cannot say which is right, and a
 mean does not have to know.
@@ -47,10 +47,11 @@ SHRINKAGES = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 """Candidates for the penalty of a correction, weakest first; fixed in advance."""
 
 FEW_SHRINKAGE = 3.0
-"""The penalty where fewer than three actions leave nothing to judge by."""
+"""The penalty where fewer than four actions leave too little to judge by."""
 
 _LAG = 6
 _LEAN = 0.1
+_JUDGED_ACTIONS = 4
 _FREE_ACTIONS = 5
 
 
@@ -58,7 +59,7 @@ def fit_general(jobs: Sequence[FitJob], progress: Progress | None = None) -> lis
     """A geometric prior plus a shrunk correction, both ways; between bodies of one kind a hop.
 
     Options: ``lag`` (largest lag searched for, 6 frames), ``window`` (past frames that a human's code shows, 0),
-    ``confidence`` (hold actions out for the error bound, true), ``shrinkage`` (of the correction; 3 below three
+    ``confidence`` (hold actions out for the error bound, true), ``shrinkage`` (of the correction; 3 below four
     actions, else a mean over candidates), ``hop_shrinkage`` (likewise, of a hop).
     """
     defaults = {"lag": _LAG, "window": 0, "confidence": True, "shrinkage": None, "hop_shrinkage": None}
@@ -119,7 +120,9 @@ def _correction(way: _Way, prior: GeometricRegressor, shrinkage: float | None) -
 
     free = len(way.pair.action_names) >= _FREE_ACTIONS
     x, y = thinned(way.source), thinned(way.target)
-    errors = None if shrinkage is not None else held_out_gaps(way.pair, way.source, way.target, way.coder, predict)
+    errors = None
+    if shrinkage is None and len(way.pair.action_names) >= _JUDGED_ACTIONS:
+        errors = held_out_gaps(way.pair, way.source, way.target, way.coder, predict)
     if errors is None:
         chosen = FEW_SHRINKAGE if shrinkage is None else float(shrinkage)
         return Ridge.path(x, y - prior(x), [chosen])[0], 1.0
