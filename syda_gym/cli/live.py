@@ -18,8 +18,9 @@ from syda_gym.cli.options import (
     MethodOption,
     ModelOption,
     MotionsOption,
+    NewRecordingOption,
     OperatorOption,
-    OutFolderOption,
+    OwnMotionsOption,
     PictureOption,
     PresetOption,
     RobotOption,
@@ -148,7 +149,7 @@ def teleop(
     preset: PresetOption = None,
     mapping: MappingOption = None,
     route: RouteOption = "auto",
-    motions: MotionsOption = "embedded",
+    motions: OwnMotionsOption = None,
     action: ActionOption = None,
     speed: Annotated[
         float, typer.Option(help="Speed of a replay.", callback=checks.between(0.0, 1000.0, open_low=True))
@@ -206,7 +207,8 @@ def teleop(
 
     say = console()
     leader, follower = ends_of(operator, robot, route)
-    stored_or_method, preset = mapping_of(method, preset, mapping)
+    named, preset = mapping_of(method, preset, mapping)
+    stored_or_method = named if method or preset or mapping else "auto"
     with say.status("choosing or fitting the mapping"):
         chosen, notices = choose_mapping(
             leader,
@@ -258,7 +260,7 @@ def teleop(
 
 
 def record(
-    out: OutFolderOption,
+    out: NewRecordingOption = None,
     operator: OperatorOption = None,
     robot: RobotOption = None,
     motions: MotionsOption = "embedded",
@@ -279,12 +281,14 @@ def record(
     Without `--action` one take of each action is played; without `--sink` a window shows the robot.
     """
     from syda_gym.motions import write_dataset
+    from syda_gym.motions.recordings import new_recording
     from syda_gym.teleoperation.addresses import make_sink, make_source, read_token
     from syda_gym.teleoperation.setup.record_session import RecordingOptions, choose_prompts, record_session
 
     say = console()
     performer, player = ends_of(operator, robot)
     clips, leader = choose_prompts(motions, player, performer, actions=action or (), takes=takes)
+    out = out or new_recording(leader.name, clips[0].body.name)
     token = read_token(token_file)
     listener = make_source(source, leader, token=token, calibration=calibration)
     options = RecordingOptions(calibration=calibration, axes=axes, countdown=countdown)
@@ -301,7 +305,7 @@ def record(
     show_table(("action", "takes", "frames", "lag [s]", "correlation", "verdict"), rows)
     for recording, reason in session.left_out.items():
         say.print(f"- {recording} left out: {reason}", markup=False)
-    say_written("written", out, f"(check it: syda-gym motions check {out})")
+    say_written("written", out, f"(check it: syda-gym motions check {out}, then: syda-gym fit {out})")
 
 
 class _Screen:
