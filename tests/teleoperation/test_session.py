@@ -16,7 +16,8 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MotionError, OptionError, TeleoperationError
 from syda_gym.routes.choice import choose_mapping
 from syda_gym.teleoperation.addresses import make_sink, make_source, read_token
-from syda_gym.teleoperation.incoming.sources import ReplaySource, UdpSource, WebSocketSource
+from syda_gym.teleoperation.incoming.network import UdpSource, WebSocketSource
+from syda_gym.teleoperation.incoming.sources import ReplaySource
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.outgoing.bullet import BulletSink
 from syda_gym.teleoperation.outgoing.naoqi import NaoqiSink

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,12 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
 from syda_gym.teleoperation.safety.clearance import Clearance
 
-__all__ = ["SelfCollision"]
+__all__ = ["RESERVE", "SelfCollision"]
+
+RESERVE = 1e-3
+"""Further distance [m] that is kept where a way is foreseen rather than known, such as that of braking."""
 
 _SAMPLES = 256
-_SMALL = 1e-3  # rad
 _STEP = 0.1  # rad; how far apart the tested poses of a way may be
 _FEW = 24  # pairs; looking at more of them one by one takes as long as looking at all
 _ALWAYS = 0.5  # pairs that touch in more than this share of random poses overlap by construction
@@ -60,10 +62,10 @@ class SelfCollision:
         except (ValueError, RuntimeError) as error:  # meshes that are missing or broken
             self.why = f"self-collision is not checked: {str(error).splitlines()[0]}"
         else:
-            self._index, self._turns = _indices(self._model, robot)
+            self._index, self._turns, self._columns = _indices(self._model, robot)
             self._configuration = np.zeros(self._model.nq)
             self._choose_pairs()
-            self._clearance = Clearance(robot, self._model, self._shapes, margin)
+            self._clearance = Clearance(robot, self._model, self._shapes, margin + RESERVE)
             self.pairs = len(self._shapes.collisionPairs)
             if not self.pairs:
                 self.why = f"self-collision is not checked: {robot.urdf.name} has no collision shapes on two links"
@@ -114,41 +116,76 @@ class SelfCollision:
         """Whether the straight way from ``start`` (known to be free) to ``end`` is free, tested every 0.1 rad."""
         return not self.available or self._is_free(start, end, self._clearance.suspects(start, end))
 
-    def allowed(self, start: FloatArray, end: FloatArray) -> FloatArray:
-        """The part of a step that stays free: all of it, or arm by arm and joint by joint what can still move.
+    def suspects(self, *poses: FloatArray) -> list[int] | None:
+        """Pairs that may touch somewhere in the box of joint angles that ``poses`` span; ``None`` if all may."""
+        return self._clearance.suspects(*poses) if self.available else []
 
-        So an arm that meets the body slides along it rather than sticking to it.
+    def free(self, poses: Sequence[FloatArray], suspects: list[int] | None, reserve: bool = False) -> bool:
+        """Whether none of the suspected pairs touches at any pose ``(n,)`` [rad]; the last one is tried first.
 
         Args:
-            start: the last command ``(n,)`` [rad], free.
-            end: the next command ``(n,)`` [rad].
+            poses: to look at.
+            suspects: indices of pairs; all if ``None``.
+            reserve: asks for ``RESERVE`` more than the margin.
+        """
+        if suspects == []:
+            return True
+        return not any(self._touches(pose, suspects, reserve) for pose in reversed(poses))
+
+    def overlaps(self, angles: FloatArray) -> dict[int, float]:
+        """Pairs nearer than the margin at ``angles`` ``(n,)`` [rad], and how near [m]."""
+        if not self.available:
+            return {}
+        everything = self._model, self._data, self._shapes, self._shape_data, self._full(angles)
+        self._pin.updateGeometryPlacements(*everything)
+        found = {}
+        for pair in self._clearance.suspects(angles) or range(self.pairs):
+            distance = float(self._pin.computeDistance(self._shapes, self._shape_data, pair).min_distance)
+            if distance < self.margin:
+                found[pair] = distance
+        return found
+
+    def near(self, angles: FloatArray, within: float) -> tuple[FloatArray, FloatArray]:
+        """Distances of near pairs and how they change with the joint angles.
+
+        Args:
+            angles: ``(n,)`` [rad].
+            within: pairs further apart are left out [m].
 
         Returns:
-            ``end`` itself, or a new array between ``start`` and ``end``.
+            Distances ``(pairs,)`` [m], negative where shapes overlap, and gradients ``(pairs, n)`` [m/rad].
         """
-        if not self.available:
-            return end
-        suspects = self._clearance.suspects(start, end)
-        if self._is_free(start, end, suspects):
-            return end
-        result = start.copy()
-        for part in self.robot.arm_slices:
-            if self._try(result, end, part, suspects):
+        pin, model, data = self._pin, self._model, self._data
+        configuration = self._full(angles)
+        pin.computeJointJacobians(model, data, configuration)
+        pin.updateGeometryPlacements(model, data, self._shapes, self._shape_data)
+        bodies: dict[int, tuple[FloatArray, FloatArray]] = {}
+        distances, gradients = [], []
+        for pair in self._clearance.within(angles, within):
+            result = pin.computeDistance(self._shapes, self._shape_data, pair)
+            if not result.min_distance < within:
                 continue
-            for joint in range(part.start, part.stop):
-                self._try(result, end, slice(joint, joint + 1), suspects)
-        return result
-
-    def _try(self, pose: FloatArray, end: FloatArray, part: slice, suspects: list[int] | None) -> bool:
-        """Moves part of a pose to ``end`` if the way is free; steps too small to matter are not worth a check."""
-        if float(np.abs(end[part] - pose[part]).max()) < _SMALL:
-            return True
-        moved = pose.copy()
-        moved[part] = end[part]
-        if not self._is_free(pose, moved, suspects):
-            return False
-        pose[part] = end[part]
-        return True
+            away = np.array(result.normal)  # from the first shape to the second
+            if not np.isfinite(away).all():
+                continue
+            ends = self._shapes.collisionPairs[pair]
+            gradient = np.zeros(len(angles))
+            for shape, sign, point in (
+                (ends.first, -1.0, result.getNearestPoint1()),
+                (ends.second, 1.0, result.getNearestPoint2()),
+            ):
+                joint = self._shapes.geometryObjects[shape].parentJoint
+                if joint == 0:
+                    continue
+                if joint not in bodies:
+                    jacobian = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)[:, self._columns]
+                    bodies[joint] = jacobian, np.array(data.oMi[joint].translation)
+                jacobian, origin = bodies[joint]
+                arm = np.array(point) - origin
+                gradient += sign * (away @ jacobian[:3] + _cross(arm, away) @ jacobian[3:])
+            distances.append(float(result.min_distance))
+            gradients.append(gradient)
+        return np.array(distances), np.array(gradients).reshape(-1, len(angles))
 
     def _is_free(self, start: FloatArray, end: FloatArray, suspects: list[int] | None) -> bool:
         """As ``free_path``, looking at the suspected pairs only, at all if there is no telling."""
@@ -160,15 +197,16 @@ class SelfCollision:
         count = math.ceil(farthest / _STEP)
         return not any(self._touches(start + (end - start) * (i / count), suspects) for i in range(count, 0, -1))
 
-    def _touches(self, angles: FloatArray, suspects: list[int] | None) -> bool:
-        everything = self._model, self._data, self._shapes, self._shape_data, self._full(angles)
+    def _touches(self, angles: FloatArray, suspects: list[int] | None, reserve: bool = False) -> bool:
+        shape_data = self._reserved if reserve else self._shape_data
+        everything = self._model, self._data, self._shapes, shape_data, self._full(angles)
         if suspects is None or len(suspects) > _FEW:
             return bool(self._pin.computeCollisions(*everything, True))
         if not suspects:
             return False
         self._pin.updateGeometryPlacements(*everything)
         look = self._pin.computeCollision
-        return any(look(self._shapes, self._shape_data, pair) for pair in suspects)
+        return any(look(self._shapes, shape_data, pair) for pair in suspects)
 
     def _full(self, angles: FloatArray) -> FloatArray:
         self._configuration[self._index] = angles
@@ -256,8 +294,10 @@ class SelfCollision:
                 self._shapes.addCollisionPair(self._pin.CollisionPair(*pairs[index]))
         self._data = self._pin.Data(self._model)
         self._shape_data = self._pin.GeometryData(self._shapes)
-        for request in self._shape_data.collisionRequests:
-            request.security_margin = self.margin
+        self._reserved = self._pin.GeometryData(self._shapes)
+        for shape_data, margin in ((self._shape_data, self.margin), (self._reserved, self.margin + RESERVE)):
+            for request in shape_data.collisionRequests:
+                request.security_margin = margin
 
 
 def _arm_model(robot: Robot) -> tuple[Any, Any]:
@@ -316,12 +356,18 @@ def _convex(shape: Any) -> None:
             shape.geometry = shape.geometry.convex
 
 
-def _indices(model: Any, robot: Robot) -> tuple[list[int], list[tuple[int, int]]]:
-    """Where each arm joint's angle goes in pinocchio's configuration, and which joints are continuous."""
-    index, turns = [], []
+def _indices(model: Any, robot: Robot) -> tuple[list[int], list[tuple[int, int]], list[int]]:
+    """Where each arm joint's angle goes in pinocchio's configuration, continuous joints, and columns of Jacobians."""
+    index, turns, columns = [], [], []
     for column, name in enumerate(robot.joint_names):
         joint = model.joints[model.getJointId(name)]
         index.append(joint.idx_q)
+        columns.append(joint.idx_v)
         if joint.nq == 2:
             turns.append((column, joint.idx_q))
-    return index, turns
+    return index, turns, columns
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross product of two vectors ``(3,)``; numpy's takes ten times as long."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
