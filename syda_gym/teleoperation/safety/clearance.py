@@ -60,8 +60,10 @@ class Clearance:
         return found
 
     def within(self, pose: FloatArray, distance: float) -> list[int]:
-        """Indices of the pairs that may be nearer than ``distance`` [m] at ``pose`` ``(n,)`` [rad]; all before any
-        measurement."""
+        """Indices of the pairs that may be nearer than ``distance`` [m] at ``pose`` ``(n,)`` [rad].
+
+        All of them before the first measurement.
+        """
         if self._pose is None:
             return list(range(len(self._weights)))
         nearest = self._room + (self._margin + _SLACK) - self._weights @ np.abs(pose - self._pose)

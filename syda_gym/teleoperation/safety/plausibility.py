@@ -169,7 +169,9 @@ class Plausibility:
         """A person who was lost is found where it was lost, after a moment of moving as people do."""
         last = self._believed
         near = last is None or (
-            math.dist(pose.middle, last.middle) <= _BACK[0] and _turn(pose.heading, last.heading) <= _BACK[1]
+            math.dist(pose.middle, last.middle) <= _BACK[0]
+            and _turn(pose.heading, last.heading) <= _BACK[1]
+            and not _turned_over(pose, last)
         )
         steady = before is None or (
             math.dist(pose.middle, before.middle) <= _PLACE[0] + _PLACE[1] * passed
