@@ -59,6 +59,7 @@ class Driver:
         self._on_decision = on_decision
         self._dropped = 0
         self._left: float | None = None
+        self._leaving: float | None = None
 
     def take(self, frames: _Takes, timeout: float) -> Received:
         """What came; a source that fails is a silent one."""
@@ -84,9 +85,11 @@ class Driver:
             tracking=1.0 if packet is None else packet.tracking,
             controls=controls,
             left=self._left,
+            leaving=self._leaving,
             position=position,
         )
         decision = self.loop.step(tick)
+        self._leaving = clock()
         self._send(decision)
         sent = self._left = clock()
         if packet is not None:

@@ -88,6 +88,8 @@ class Journal:
             line["controls"] = list(tick.controls)
         if tick.left is not None:
             line["left"] = tick.left
+        if tick.leaving is not None:
+            line["leaving"] = tick.leaving
         if tick.position is not None:
             line["position"] = tick.position.tolist()
         if not math.isnan(decision.bound):
@@ -300,6 +302,7 @@ def _tick(line: dict[str, Any]) -> Tick:
         tracking=float(line.get("tracking", 1.0)),
         controls=tuple(line.get("controls", ())),
         left=None if line.get("left") is None else float(line["left"]),
+        leaving=None if line.get("leaving") is None else float(line["leaving"]),
         position=None if line.get("position") is None else np.array(line["position"], dtype=np.float64),
     )
 

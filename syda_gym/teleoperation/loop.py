@@ -165,7 +165,7 @@ class TeleoperationLoop:
             # The process stood still, for example in a suspended laptop: nobody knows what the person did meanwhile.
             self.state = State.HOLDING
         self._last = now
-        self._motion.begin(now, tick.left)
+        self._motion.begin(now, tick.left, tick.leaving)
 
     def _request(self, control: str, tick: Tick) -> None:
         if control not in CONTROLS:

@@ -124,6 +124,7 @@ class Tick:
         tracking: confidence of the source in the frame, 0 to 1.
         controls: requests out of ``CONTROLS``, in order.
         left: when the command before had left, at the latest [s, the loop's clock], or ``None`` if not known.
+        leaving: when it left at the earliest [s], or ``None``.
         position: joint angles ``(n,)`` [rad] that the robot says it has, asked at a release, or ``None``.
     """
 
@@ -133,6 +134,7 @@ class Tick:
     tracking: float = 1.0
     controls: tuple[str, ...] = ()
     left: float | None = None
+    leaving: float | None = None
     position: FloatArray | None = None
 
 

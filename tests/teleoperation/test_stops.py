@@ -1,4 +1,4 @@
-"""Stops that stop: in every state, from keys and network, on the way home too; and nothing but the driver lifts them."""
+"""Stops that stop: in every state, from keys and network, on the way home too; the driver alone lifts them."""
 
 from __future__ import annotations
 

@@ -86,9 +86,10 @@ class _NetworkSource(Source):
             self._shut_listener()
             self._open()
         except Exception as error:  # the port is still taken, or there is no descriptor left
-            why = f"{why}; {error}"
+            self._news.append(f"the listener on port {self.port} died ({why}) and cannot be started: {error}")
             self._ending.wait(_AGAIN)
-        self._news.append(f"the listener on port {self.port} died ({why}) and is started anew")
+        else:
+            self._news.append(f"the listener on port {self.port} died ({why}) and was started anew")
 
     def _shut_listener(self) -> None:
         """Frees the address and leaves the inbox open."""
@@ -281,7 +282,8 @@ class WebSocketSource(_NetworkSource):
     def _shut_listener(self) -> None:
         server, self._server = self._server, None
         if server is not None:
-            server.shutdown()
+            with contextlib.suppress(OSError):
+                server.shutdown()
 
     def _run(self) -> None:
         while not self._ending.is_set():
@@ -291,6 +293,7 @@ class WebSocketSource(_NetworkSource):
                     server.serve_forever()
                 except Exception as error:  # no thread or descriptor left
                     why = repr(error)
+                self._shut_listener()
                 for end in (server.shutdown_watcher, server.shutdown_notifier):
                     with contextlib.suppress(OSError):
                         os.close(end)

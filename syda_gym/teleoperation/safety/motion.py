@@ -104,10 +104,10 @@ class Motion:
         self._trail.clear()
         self._overlaps = {} if self._collision is None else self._collision.overlaps(self.command)
 
-    def begin(self, now: float, left: float | None) -> None:
-        """A step begins at ``now`` [s]; the last command had left at ``left`` [s], if that is known."""
+    def begin(self, now: float, left: float | None, leaving: float | None = None) -> None:
+        """A step begins at ``now`` [s]; the last command left between ``leaving`` and ``left`` [s], if known."""
         self._now = now
-        self._pace.begin(now, left)
+        self._pace.begin(now, left, leaving)
 
     def freeze(self) -> None:
         """Stands still at once, whatever the acceleration: an emergency stop."""

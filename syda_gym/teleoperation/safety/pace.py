@@ -40,21 +40,24 @@ class Pace:
         self.change = 0.0
         self._step = np.zeros(joints)  # the last command less the one before
         self._planned = np.zeros(joints)
-        self._before: float | None = None  # when the command before the last one left
-        self._last: float | None = None  # when the last one left
-        self._change = period
+        self._before: float | None = None  # when the command before the last one had left
+        self._first: float | None = None  # when it left at the earliest
+        self._last: float | None = None  # when the last one had left
+        self._last_first = 0.0
 
-    def begin(self, now: float, left: float | None) -> None:
+    def begin(self, now: float, left: float | None, leaving: float | None = None) -> None:
         """A command is to be found at ``now`` [s].
 
         Args:
             now: the loop's clock.
             left: when the last command had left, at the latest, on the same clock; if not known, when it was decided.
+            leaving: when it left at the earliest; if not known, at ``left``.
         """
         if self._last is None:
             self.dt = self.change = 0.0
             return
         last = self._last if left is None else min(max(left, self._last), now)
+        first = last if leaving is None else min(max(leaving, self._last), last)
         passed = now - last
         self.dt = min(passed, 1.5 * self._period)
         if passed > _STALL * self._period:  # nothing came for so long that the robot has come to rest
@@ -63,10 +66,12 @@ class Pace:
             self.change = self.dt
         else:
             # Without a history, as if the robot had stood still for a period.
-            interval = self._period if self._before is None else last - self._before
-            self.velocity = self._step / interval if interval > _TINY else self._planned
-            self.change = 0.5 * (interval + self.dt)
-        self._last = last
+            longest = self._period if self._first is None else last - self._first
+            shortest = self._period if self._before is None else first - self._before
+            # The slower of what it may have been: getting faster is what harms.
+            self.velocity = self._step / longest if longest > _TINY else self._planned
+            self.change = 0.5 * (max(shortest, 0.0) + self.dt)
+        self._last, self._last_first = last, first
 
     @property
     def idle(self) -> bool:
@@ -76,13 +81,14 @@ class Pace:
     def end(self, now: float, step: FloatArray) -> None:
         """The command was found: the last one plus ``step`` ``(n,)`` [rad]."""
         if self._last is None:
-            self._last = now
+            self._last = self._last_first = now
             return
         if self.idle:  # one command sent twice
             return
         planned = step / self.dt
         self.acceleration = (planned - self.velocity) / max(self.change, _TINY)
-        self._before, self._last = self._last, now
+        self._before, self._first = self._last, self._last_first
+        self._last = self._last_first = now
         self._step, self._planned = step, planned
 
     def rest(self) -> None:

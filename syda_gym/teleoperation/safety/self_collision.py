@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -298,6 +299,11 @@ class SelfCollision:
         for shape_data, margin in ((self._shape_data, self.margin), (self._reserved, self.margin + RESERVE)):
             for request in shape_data.collisionRequests:
                 request.security_margin = margin
+            with warnings.catch_warnings():  # the attribute is going to be renamed, and its successor does nothing yet
+                warnings.simplefilter("ignore", DeprecationWarning)
+                for request in (*shape_data.collisionRequests, *shape_data.distanceRequests):
+                    # A search that begins where the last one ended has last bits that depend on what was asked before.
+                    request.enable_cached_gjk_guess = False
 
 
 def _arm_model(robot: Robot) -> tuple[Any, Any]:

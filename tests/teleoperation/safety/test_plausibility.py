@@ -17,6 +17,7 @@ DT = 1 / 30
 HANG = {"L": ([0, 0.1, -1], [0.2, 0.05, -1]), "R": ([0, -0.1, -1], [0.2, -0.05, -1])}
 FORWARD = {"L": ([1, 0.1, -0.1], [1, 0, 0]), "R": ([1, -0.1, -0.1], [1, 0, 0])}
 WAVE = {"L": ([0, 0.1, -1], [0.2, 0.05, -1]), "R": ([0.3, -0.9, 0.2], [0.1, -0.2, 1])}
+ASIDE, UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 TO_KINECT = np.array([[0, -1, 0], [0, 0, 1], [-1, 0, 0]])
 
 
@@ -108,7 +109,7 @@ def test_a_spike_of_a_hand_is_dropped_and_a_hand_that_stays_is_followed(watcher:
 def test_somebody_else_is_never_followed(watcher: Watcher, name: str, reason: str) -> None:
     watcher.see(points(WAVE), 30)
     odd = {
-        "a metre aside": lambda index: points(WAVE) + [0.0, 1.0, 0.0],
+        "a metre aside": lambda index: points(WAVE) + ASIDE,
         "mirrored": lambda index: points(WAVE) * [1.0, -1.0, 1.0],
         "turned round": lambda index: turned(points(WAVE), 2.6),
         "upside down": lambda index: points(WAVE) * [1.0, 1.0, -1.0],
@@ -116,7 +117,7 @@ def test_somebody_else_is_never_followed(watcher: Watcher, name: str, reason: st
                                              for side, (upper, fore) in HANG.items()}),
         "spinning": lambda index: turned(points(WAVE), 20.0 * index * DT),
         "growing": lambda index: points(WAVE, 1.0 + 0.01 * index) - [0.0, 0.0, 0.014 * index],
-        "a child in the same place": lambda index: points(WAVE, 0.7) + [0.0, 0.0, 0.42],
+        "a child in the same place": lambda index: points(WAVE, 0.7) + 0.42 * UP,
     }[name]  # fmt: skip
     if name == "turned over":
         watcher.see(points(HANG), 30)
@@ -168,12 +169,12 @@ def test_the_loop_holds_counts_and_takes_who_stands_still(mapping: LimbMapping, 
 
     assert see(points(HANG), 90)[-1].state is State.FOLLOWING
     see(points(FORWARD), 90)
-    other = see(points(WAVE) + [0.0, 1.0, 0.0], 60)
+    other = see(points(WAVE) + ASIDE, 60)
     assert any("person: jumped to another place" in decision.reasons for decision in other)
     assert not any(decision.frame_used for decision in other)
     assert other[-1].state is State.EASING
     assert np.abs(other[30].command - other[15].command).max() == 0.0, "first it holds"
-    taken = see(points(HANG, 0.95) + [0.0, 1.0, 0.0], 120)
+    taken = see(points(HANG, 0.95) + ASIDE, 120)
     assert taken[-1].state is State.FOLLOWING, "whoever stands still with hanging arms is the operator"
     first = next(decision for decision in taken if decision.state is State.FOLLOWING)
     assert first.factor < 0.3, "and the start is gentle"
