@@ -169,6 +169,7 @@ def wire(args: argparse.Namespace) -> dict[str, Any]:
     with UdpSource(adult, port=0) as source:
         receiver = context.Process(target=_receive, args=(pipes[1], args.count))
         receiver.start()
+        pipes[1].close()  # so that a receiver that died is noticed
         port = pipes[0].recv()
         others = [context.Process(target=_burn, args=(3 * seconds,)) for _ in range(os.cpu_count() or 1)]
         others.append(context.Process(target=_send, args=(source.port, args.rate, 3 * seconds)))
@@ -178,7 +179,7 @@ def wire(args: argparse.Namespace) -> dict[str, Any]:
             process.start()
         with UdpSink(robot, port=port) as sink:
             while receiver.is_alive() and not pipes[0].poll():
-                run(source, loop, sink, seconds=5.0, rest_at_end=False)
+                run(source, loop, sink, seconds=1.0, rest_at_end=False)
             stamps, path = pipes[0].recv()
         for process in others:
             process.kill()

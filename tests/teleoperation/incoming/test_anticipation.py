@@ -97,7 +97,7 @@ def test_a_rehearsal_changes_no_bit(mapping: LimbMapping, adult: HumanSkeleton, 
         assert plain.command.tobytes() == rehearsed.command.tobytes()
         assert (plain.state, plain.factor, plain.reasons) == (rehearsed.state, rehearsed.factor, rehearsed.reasons)
         states.add(plain.state)
-    assert len(states) >= 6, "all that a run may see"
+    assert len(states) >= 5, "what a run may see"
     assert np.abs(plain.command - pepper.rest).max() > 0.2
     mapping.broken = ValueError("no")
     loops[1].rehearse()

@@ -30,9 +30,11 @@ PATIENCE = 60.0
 
 def wait_for(what: Callable[[], bool]) -> bool:
     end = time.monotonic() + PATIENCE
-    while not what() and time.monotonic() < end:
+    while time.monotonic() < end:
+        if what():
+            return True
         time.sleep(0.02)
-    return what()
+    return False
 
 
 def test_bare_connections_do_not_shut_the_websocket(adult: HumanSkeleton, wave: Wave) -> None:

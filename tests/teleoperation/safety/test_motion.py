@@ -111,7 +111,7 @@ def test_a_detour_is_found_where_the_straight_way_is_barred(pepper: Robot) -> No
         else:
             pytest.fail("the way that was found leads there")
         arm.check()
-    assert found > 2
+    assert found >= 2
 
 
 def test_the_way_that_it_came_is_a_way_back(pepper: Robot) -> None:
