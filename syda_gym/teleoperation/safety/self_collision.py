@@ -162,8 +162,9 @@ class SelfCollision:
         pin.updateGeometryPlacements(model, data, self._shapes, self._shape_data)
         bodies: dict[int, tuple[FloatArray, FloatArray]] = {}
         distances, gradients = [], []
+        look, shapes, shape_data = pin.computeDistance, self._shapes, self._shape_data
         for pair in self._clearance.within(angles, within):
-            result = pin.computeDistance(self._shapes, self._shape_data, pair)
+            result = look(shapes, shape_data, pair)
             if not result.min_distance < within:
                 continue
             away = np.array(result.normal)  # from the first shape to the second
