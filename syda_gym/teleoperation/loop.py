@@ -25,6 +25,7 @@ __all__ = ["TeleoperationLoop"]
 
 _GENTLE = 0.2  # speed factor at the beginning of a soft start
 _ARRIVED = 1e-3  # rad
+_SHORTEST = 1e-3  # s; frames that arrive together are taken to be so far apart
 
 
 class TeleoperationLoop:
@@ -187,8 +188,9 @@ class TeleoperationLoop:
         if odd:
             reasons.append(f"frame: {odd}")
             return float("nan"), False
+        passed, anew = self._passed(tick)
         try:
-            mapped = self._guarded(self.calibration.apply(frame))
+            mapped = self._guarded(self.calibration.apply(frame), passed)
         except (SydaError, ArithmeticError, ValueError) as error:  # a robot in motion must survive any mapping
             reasons.append(f"mapping: {' '.join(str(error).split())[:200] or type(error).__name__}")
             return float("nan"), False
@@ -203,7 +205,7 @@ class TeleoperationLoop:
             reasons.append("unfamiliar: slowed")
             trust = min(trust, self.settings.unfamiliar)
         self._trust = trust
-        self._aim(mapped.angles, tick)
+        self._aim(mapped.angles, tick, passed, anew)
         return mapped.bound, True
 
     def _calibrate(self, tick: Tick, frame: FloatArray, reasons: list[str]) -> None:
@@ -216,15 +218,21 @@ class TeleoperationLoop:
             if self.state is State.CALIBRATING:
                 self.state = State.HOLDING
 
-    def _aim(self, angles: FloatArray, tick: Tick) -> None:
-        """Filters the mapped angles into the target and feeds the watchdog."""
+    def _passed(self, tick: Tick) -> tuple[float, bool]:
+        """Time since the frame before [s], and whether that one is not the operator's past any more."""
         passed = self._targets.advance(tick.now, tick.sent)
-        fresh = self._watchdog.verdict(tick.now) is not Watch.FOLLOW
+        anew = self._watchdog.verdict(tick.now) is not Watch.FOLLOW or not 0.0 <= passed < 1.0
+        if anew:
+            self._guarded.reset()
+        return max(passed, _SHORTEST), anew
+
+    def _aim(self, angles: FloatArray, tick: Tick, passed: float, anew: bool) -> None:
+        """Filters the mapped angles into the target and feeds the watchdog."""
         self._watchdog.feed(tick.now)
         if self._filter is None:
             self._target = angles
             return
-        if fresh or not 0.0 <= passed < 1.0:  # the filter's past is not the operator's any more
+        if anew:
             self._filter.reset(angles)
         self._target = self._filter(angles, passed)
 

@@ -49,6 +49,13 @@ class MinkArmCoder(RobotArmCoder):
         self._constraints = [mink.DofFreezingTask(self._model, frozen)] if frozen else []
         self._limits = [mink.ConfigurationLimit(self._model)]
 
+    def begin(self) -> None:
+        """Nothing: mink remembers frames within one call of ``decode`` only."""
+
+    def follow(self, codes: FloatArray, memory: None, dt: float | None, limited: bool) -> tuple[FloatArray, None]:
+        """``decode``, which is warm-started from frame to frame anyhow."""
+        return self.decode(codes), None
+
     def decode(self, codes: FloatArray) -> FloatArray:
         """Joint angles ``(N, n)``."""
         goals = self._goals(codes)
