@@ -156,7 +156,7 @@ class Bones:
             ratio = 1.0 if angle < 1e-6 else angle / np.sqrt(max(1.0 - cosine**2, 1e-16))
             total += np.sqrt(angle**2 + smooth**2)
             gradient -= ratio / np.sqrt(angle**2 + smooth**2) * (wanted[limb] @ slope[limb])
-        for (joint, by, limit), (_, scale) in zip(self.coupled, scales, strict=True):
+        for (joint, by, _), (_, scale) in zip(self.coupled, scales, strict=True):
             nudge = 1e-6  # how the governed joint goes along with its governor
             moved = x.copy()
             moved[by] += nudge
@@ -250,7 +250,8 @@ def rivals(body: HumanSkeleton, robot: Robot) -> dict[str, CodedMapping]:
 
     mapping = geometric_mapping(body, robot)
     fitted = fit(load_motions("embedded", fps=5.0).pair("adult", "pepper"), method="mink")
-    assert isinstance(mapping, CodedMapping) and isinstance(fitted, CodedMapping)
+    assert isinstance(mapping, CodedMapping)
+    assert isinstance(fitted, CodedMapping)
     coder = MinkArmCoder(robot, mapping.target_coder.settings(), mapping.target_coder.arrays())
     share = float(body.upper_arm / (body.upper_arm + body.forearm))
     found = {}
@@ -342,9 +343,7 @@ def other_robots(urdfs: Sequence[str], people: dict[str, tuple[HumanSkeleton, Fl
         for body, frames in people.values():
             wanted = wanted_directions(body, frames[:150])
             path = LimbIK.of(robot).sequence(wanted, FPS)
-            rows.append(
-                (off(arms, path, wanted), off(arms, optimum(arms, wanted, fast=True), wanted))
-            )
+            rows.append((off(arms, path, wanted), off(arms, optimum(arms, wanted, fast=True), wanted)))
         ours, best = np.mean(rows, axis=0)
         result[name] = {"sequence": ours, "optimum_in_sequence": best, "above": ours - best}
         print(f"{name:28s} {ours:6.2f} {best:6.2f}", flush=True)
@@ -370,7 +369,10 @@ def solver_speed(robot: Robot, people: dict[str, tuple[HumanSkeleton, FloatArray
         ("independent_ms", lambda: ik.solve(wanted)),
         ("mink_ms", lambda: rival(frames)),
     )}  # fmt: skip
-    return {**{name: 1e3 * value for name, value in spent.items()}, "times_mink": spent["mink_ms"] / spent["one_frame_ms"]}
+    return {
+        **{name: 1e3 * value for name, value in spent.items()},
+        "times_mink": spent["mink_ms"] / spent["one_frame_ms"],
+    }
 
 
 def _spent(job: Callable[[], object]) -> float:

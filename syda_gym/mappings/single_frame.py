@@ -46,9 +46,7 @@ class SingleFrame:
         rows = self._codes(frame)
         return None if rows is None else self._coder.decode_one(rows)
 
-    def follow(
-        self, frame: FloatArray, memory: Any, dt: float | None, limited: bool
-    ) -> tuple[FloatArray, Any] | None:
+    def follow(self, frame: FloatArray, memory: Any, dt: float | None, limited: bool) -> tuple[FloatArray, Any] | None:
         """The same for the next frame of a clip, with the memory after it."""
         rows = self._codes(frame)
         return None if rows is None else self._coder.follow_one(rows, memory, dt, limited)

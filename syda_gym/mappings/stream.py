@@ -19,8 +19,8 @@ class FrameStream:
     """Maps one frame after the other and gives what the whole clip would give, row by row.
 
     Without ``fps`` that is ``mapping(clip)``: every frame for itself, apart from the past frames that a window looks
-    at. With ``fps`` it is ``mapping.follow`` over the clip: among equally good joint angles the nearest to those before,
-    within the speeds of the joints that follow limbs.
+    at. With ``fps`` it is ``mapping.follow`` over the clip: among equally good joint angles the nearest to those
+    before, within the speeds of the joints that follow limbs.
 
     Args:
         mapping: with or without a window, or a chain.

@@ -91,8 +91,9 @@ class GuardedMapping:
         return mapped._replace(unfamiliar=self._unfamiliar)
 
     def walk(self, frame: FloatArray, look: bool, dt: float | None = None) -> Mapped:
-        """The same, but familiarity is told only of frames at which one looks, and without ``dt`` the frames before
-        do not count.
+        """The same, but without a count: familiarity is told only of frames at which one looks.
+
+        Without ``dt`` the frames before do not count either.
 
         Raises:
             SydaError: whatever the mapping raises on a frame that it cannot take.

@@ -43,8 +43,9 @@ class ArmKinematics(nn.Module):
         return self._walk(angles)[0]
 
     def limbs(self, angles: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """``kernel.look``: unit upper arm and forearm ``(B, 6)``, their derivatives by the movers ``(B, m, 6)``, and how
-        each mover turns the arm about its own length ``(B, m)``.
+        """``kernel.look``: unit upper arm and forearm ``(B, 6)``, their derivatives, and turns about the arm's length.
+
+        The derivatives by the movers are ``(B, m, 6)``, the turns ``(B, m)``.
         """
         points, origins, axes = self._walk(angles)
         arms = points[:, None] - origins[:, :, None]

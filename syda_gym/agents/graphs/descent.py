@@ -189,7 +189,21 @@ class _Loop(nn.Module):
 
 def _scripted(step: _Step, joints: int, movers: int) -> Any:
     rows = 2
-    widths = ((joints,), (6,), (movers, 6), (1,), (1,), (1,), (6,), (joints,), (joints,), (joints,), (1,), (1,), (movers,))
+    widths = (
+        (joints,),
+        (6,),
+        (movers, 6),
+        (1,),
+        (1,),
+        (1,),
+        (6,),
+        (joints,),
+        (joints,),
+        (joints,),
+        (1,),
+        (1,),
+        (movers,),
+    )
     example = tuple(torch.zeros(rows, *shape, dtype=torch.float64) for shape in widths)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # remarks of the tracer about constants, and of newer versions about its age

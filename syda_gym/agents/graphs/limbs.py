@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 import torch
 from torch import Tensor, nn
 
@@ -60,12 +59,14 @@ class LimbGraph(nn.Module):
         bend = torch.where(begun, bend, flexion)
         lower = torch.maximum(self.lower + 0.0 * before, before - self.reach)
         upper = torch.minimum(self.upper + 0.0 * before, before + self.reach)
-        firm = (self.arm.habits.stiff / (bend * bend * bend * bend + 1e-12)).clamp(max=self.arm.habits.firm) * (kernel.FRAME / self.dt)
+        firm = (self.arm.habits.stiff / (bend * bend * bend * bend + 1e-12)).clamp(max=self.arm.habits.firm) * (
+            kernel.FRAME / self.dt
+        )
         hold = self.hold + 0.0 * firm
         near, miss = self.descent(before, target, lower, upper, before, hold, firm, begun & ~going)
         calm = begun & ~going & (miss < self.arm.habits.calm)
         whole = self.lower + 0.0 * before, self.upper + 0.0 * before
-        along, reached = self.descent(goal, target, *whole, goal, hold, 0.0 * firm, begun & ~calm)
+        along, reached = self.descent(goal, target, *whole, goal, kernel.REST + 0.0 * hold, 0.0 * firm, begun & ~calm)
         other, best = self._solve(target, ~calm)
         better = best < reached - self.arm.habits.margin
         patience = torch.where(better & ~calm & begun, patience + self.dt, 0.0 * patience)

@@ -36,10 +36,10 @@ class Habits(NamedTuple):
         patience: for how long [s] it must.
     """
 
-    glue: float = 1e-3
-    stiff: float = 2e-3
+    glue: float = 2e-3
+    stiff: float = 1.5e-3
     firm: float = 50.0
-    opening: float = 0.1
+    opening: float = 0.05
     calm: float = 0.01
     margin: float = 0.03
     patience: float = 0.25

@@ -44,7 +44,6 @@ FRAME = 1.0 / 30.0
 """Time step [s] for which the next two are given."""
 
 
-
 @compiled
 def _away(a, b):
     """Sum of the distances of the joints."""
@@ -90,8 +89,7 @@ def _walk(arm, q, points, origins, axes):
 
 @compiled
 def look(arm, q, found, columns, turning):
-    """Directions of upper arm and forearm (6,), their derivatives by the movers (m, 6), and how each turns the arm
-    about its own length (m,)."""
+    """Directions of both limbs (6,), derivatives (m, 6), and how each mover turns the arm about its length (m,)."""
     k = len(arm.steps)
     points, origins, axes = np.empty((3, 3)), np.empty((k, 3)), np.empty((k, 3))
     _walk(arm, q, points, origins, axes)
@@ -141,8 +139,7 @@ def _range(arm, which, governor):
 
 @compiled
 def _limits(arm, q, lower, upper, low, high, slopes):
-    """The box within ``lower`` and ``upper`` that the coupled limits leave at ``q``, and how its sides move with the
-    governors (c, 2)."""
+    """The box that the coupled limits leave at ``q``, and how its sides move with the governors (c, 2)."""
     copy(lower, low)
     copy(upper, high)
     for which in range(len(arm.governed)):
@@ -399,6 +396,7 @@ def follow_arm(arm, target, dt, limited, fresh, state):
         return
     bend = state[2 * n + 2]
     bend = min(flexion, bend + (flexion - bend) * dt / (dt + arm.habits.opening))
+    going = state[2 * n + 1] > 0.5
     if limited:
         for j in range(n):
             reach = arm.speed[j] * dt * WITHIN
@@ -406,7 +404,7 @@ def follow_arm(arm, target, dt, limited, fresh, state):
     # The tighter in time frames follow, the less each may move what it hardly shows.
     hold = arm.habits.glue * FRAME / dt
     firm = min(arm.habits.firm, arm.habits.stiff / (bend * bend * bend * bend + 1e-12)) * FRAME / dt
-    patience, going = state[2 * n], state[2 * n + 1] > 0.5
+    patience = state[2 * n]
     copy(before, q)
     miss = math.inf
     if not going:
@@ -417,13 +415,16 @@ def follow_arm(arm, target, dt, limited, fresh, state):
     else:
         # Where this branch leads without speed limits, and where the best of all branches is.
         copy(goal, other)
-        along = refine(arm, goal, target, arm.lower, arm.upper, other, hold, 0.0)
+        along = refine(arm, goal, target, arm.lower, arm.upper, other, REST, 0.0)
         best = solve_arm(arm, target, other)
         patience = patience + dt if best < along - arm.habits.margin else 0.0
         if patience > arm.habits.patience:
             copy(other, goal)
             patience, going = 0.0, True
-        if going:
+        if going:  # another branch is never jumped to
+            for j in range(n):
+                reach = arm.speed[j] * dt * WITHIN
+                lower[j], upper[j] = max(lower[j], before[j] - reach), min(upper[j], before[j] + reach)
             copy(goal, q)
             _project(arm, q, lower, upper, before)
             going = _away(q, goal) > 1e-9

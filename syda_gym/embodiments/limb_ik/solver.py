@@ -133,7 +133,9 @@ class LimbIK:
                 f"the state is of {len(state)} sequences with {state.numbers.shape[1]} numbers each; "
                 f"{self.robot.name!r} needs {self.state_size} for each of {count} sequences"
             )
-        steps = np.array(np.broadcast_to(np.asarray(self._kernel.FRAME if dt is None else dt, dtype=np.float64), (count, length)))
+        steps = np.array(
+            np.broadcast_to(np.asarray(self._kernel.FRAME if dt is None else dt, dtype=np.float64), (count, length))
+        )
         if not (np.isfinite(steps).all() and (steps > 0.0).all()):
             raise EmbodimentError("the time between frames must be positive and finite")
         numbers, frames = state.numbers.copy(), np.empty((count, length, self.robot.n_features))

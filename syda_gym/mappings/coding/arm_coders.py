@@ -172,8 +172,8 @@ class HumanArmCoder(Coder):
 class RobotArmCoder(Coder):
     """A robot's arm as its two unit limb directions, then the angles of joints that move neither elbow nor wrist.
 
-    Directions are decoded by ``LimbIK`` within the joint limits: ``decode`` takes each frame for itself, ``follow`` takes
-    them in time order. A wrist yaw passes as it is.
+    Directions are decoded by ``LimbIK`` within the joint limits: ``decode`` takes each frame for itself, ``follow``
+    takes them in time order. A wrist yaw passes as it is.
 
     Args:
         body: a robot.

@@ -204,7 +204,7 @@ def test_arms_with_many_joints_follow_what_they_can_reach(name, wide, clavicle):
 
 def test_a_joint_before_the_shoulder_helps(clavicle):
     """A pose that needs the clavicle is met by a single frame too; the elbow does not stay at rest."""
-    q, directions = reachable(clavicle, 0, 30)
+    _, directions = reachable(clavicle, 0, 30)
     assert angles(clavicle, LimbIK.of(clavicle).solve(directions), directions).mean() < 0.5
 
 
@@ -277,10 +277,12 @@ def test_limits_that_exclude_every_answer_are_named():
     pepper = catalog.get("pepper")
     impossible = CoupledLimit("LElbowRoll", "LElbowYaw", (-2.0, 2.0), (0.5, 0.5), (1.0, 1.0))
     robot = Robot(replace(pepper.description, coupled_limits=(impossible,)))
-    with pytest.raises(EmbodimentError, match="LElbowRoll.*leaves no angle"):
+    with pytest.raises(EmbodimentError, match=r"LElbowRoll.*leaves no angle"):
         LimbIK(robot)
 
 
 def test_numba_is_not_imported_before_an_arm_is_solved():
-    code = "import sys, syda_gym; from syda_gym.embodiments import catalog; catalog.get('pepper'); assert 'numba' not in sys.modules"
+    code = (
+        "import sys; from syda_gym.embodiments import catalog; catalog.get('pepper'); assert 'numba' not in sys.modules"
+    )
     subprocess.run([sys.executable, "-c", code], check=True)
