@@ -19,9 +19,10 @@ def compiled(function: Function) -> Function:
     another file's functions call must touch that file too.
     """
     try:
-        return numba.njit(cache=True, error_model="numpy")(function)
+        made: Function = numba.njit(cache=True, error_model="numpy")(function)
     except RuntimeError:  # no folder can be written: compile in every process
-        return numba.njit(error_model="numpy")(function)
+        made = numba.njit(error_model="numpy")(function)
+    return made
 
 
 @compiled
