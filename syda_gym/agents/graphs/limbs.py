@@ -37,6 +37,7 @@ class LimbGraph(nn.Module):
         self.descent = Descent(self.kinematics, self.limits, self.joints)
         self.lower, self.upper = constant(arm.lower), constant(arm.upper)
         self.rest, self.reach = constant(arm.rest), constant(arm.speed * dt * kernel.WITHIN)
+        self.speed = constant(arm.speed)
         self.seeds = [constant(seed) for seed in arm.seeds]
         self.turns = constant(arm.turns)
         self.hold = arm.habits.glue * kernel.FRAME / dt
@@ -67,10 +68,10 @@ class LimbGraph(nn.Module):
         calm = begun & ~going & (miss < self.arm.habits.calm)
         whole = self.lower + 0.0 * before, self.upper + 0.0 * before
         along, reached = self.descent(goal, target, *whole, goal, kernel.REST + 0.0 * hold, 0.0 * firm, begun & ~calm)
-        other, best = self._solve(target, ~calm)
-        better = best < reached - self.arm.habits.margin
-        patience = torch.where(better & ~calm & begun, patience + self.dt, 0.0 * patience)
-        switch = patience > self.arm.habits.patience
+        other, best = self._solve(target, before, ~calm)
+        patience = (patience + (reached - best - self.arm.habits.margin) * self.dt).clamp(min=0.0)
+        patience = torch.where(~calm & begun, patience, 0.0 * best)
+        switch = patience > self._crossing(before, other, target).clamp(min=self.arm.habits.patience)
         goal = torch.where(switch | ~begun, other, torch.where(calm, near, along))
         patience = torch.where(switch, 0.0 * patience, patience)
         going = (going | switch) & begun
@@ -80,21 +81,30 @@ class LimbGraph(nn.Module):
         going = (going & left).to(torch.float64)
         return angles, torch.cat([angles, goal, patience, going, bend], dim=1)
 
-    def _solve(self, target: Tensor, wanted: Tensor) -> tuple[Tensor, Tensor]:
+    def _crossing(self, start: Tensor, goal: Tensor, target: Tensor) -> Tensor:
+        """``kernel._crossing``."""
+        way, total = goal - start, 0.0 * target[:, :1]
+        for stop in range(kernel.WAY):
+            found = self.kinematics.limbs(start + (stop + 1.0) / (kernel.WAY + 1.0) * way)[0]
+            total = total + miss_of(found, target)
+        longest = (way.abs() / self.speed).max(dim=1, keepdim=True)[0]
+        return longest * total / kernel.WAY
+
+    def _solve(self, target: Tensor, near: Tensor, wanted: Tensor) -> tuple[Tensor, Tensor]:
         """``kernel.solve_arm`` for the rows that want it: angles and misses."""
         closed = self._closed_form(target) if len(self.arm.closed) else []
         seeds = [seed + 0.0 * target[:, :1] for seed in self.seeds]
         count, rows = len(closed) + len(seeds), target.shape[0]
         box = [(limit + 0.0 * target[:, :1]).repeat(count, 1) for limit in (self.lower, self.upper)]
-        rest = (self.rest + 0.0 * target[:, :1]).repeat(count, 1)
-        starts = self.limits.project(torch.cat([*closed, *seeds]), *box, rest)
+        anchor = near.repeat(count, 1)
+        starts = self.limits.project(torch.cat([*closed, *seeds]), *box, (self.rest + 0.0 * anchor))
         misses = miss_of(self.kinematics.limbs(starts)[0], target.repeat(count, 1)).reshape(count, -1)
         starts = starts.reshape(count, -1, self.joints)
-        best, least, miss = starts[0], self._score(misses[0, :, None], starts[0]), misses[0, :, None]
+        best, least, miss = starts[0], self._score(misses[0, :, None], starts[0], near), misses[0, :, None]
         for index in range(1, count):
             # Where the closed form has an answer the seeds are not asked.
             asked = miss >= kernel.NEAR if index >= len(closed) else miss >= 0.0
-            score = self._score(misses[index, :, None], starts[index])
+            score = self._score(misses[index, :, None], starts[index], near)
             better = asked & (score < least)
             best, least = torch.where(better, starts[index], best), torch.where(better, score, least)
             miss = torch.where(better, misses[index, :, None], miss)
@@ -102,23 +112,23 @@ class LimbGraph(nn.Module):
         order = torch.topk(misses, some, dim=0, largest=False, sorted=True)[1]
         chosen = torch.gather(starts, 0, order[:, :, None].repeat(1, 1, self.joints)).reshape(-1, self.joints)
         active = (wanted & (miss >= kernel.NEAR)).repeat(some, 1)
-        box = [limit[: some * rows] for limit in (*box, rest)]
+        box = [limit[: some * rows] for limit in (*box, anchor)]
         still = 0.0 * chosen[:, :1]
         found, reached = self.descent(
             chosen, target.repeat(some, 1), box[0], box[1], box[2], kernel.REST + still, still, active
         )
         found, reached = found.reshape(some, -1, self.joints), reached.reshape(some, -1, 1)
-        refined, least, value = found[0], self._score(reached[0], found[0]), reached[0]
+        refined, least, value = found[0], self._score(reached[0], found[0], near), reached[0]
         for index in range(1, some):
-            score = self._score(reached[index], found[index])
+            score = self._score(reached[index], found[index], near)
             better = score < least
             refined, least = torch.where(better, found[index], refined), torch.where(better, score, least)
             value = torch.where(better, reached[index], value)
-        near = miss < kernel.NEAR
-        return torch.where(near, best, refined), torch.where(near, miss, value)
+        exact = miss < kernel.NEAR
+        return torch.where(exact, best, refined), torch.where(exact, miss, value)
 
-    def _score(self, miss: Tensor, angles: Tensor) -> Tensor:
-        return miss + kernel.PULL * (angles - self.rest).abs().sum(dim=1, keepdim=True)
+    def _score(self, miss: Tensor, angles: Tensor, near: Tensor) -> Tensor:
+        return miss + kernel.PULL * (angles - near).abs().sum(dim=1, keepdim=True)
 
     def _closed_form(self, target: Tensor) -> list[Tensor]:
         """The four solutions without regard to limits."""

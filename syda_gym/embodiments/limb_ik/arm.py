@@ -33,16 +33,16 @@ class Habits(NamedTuple):
         opening: time [s] after which a bent elbow is believed.
         calm: a miss below this makes nobody look for another branch.
         margin: by how much less another branch must miss.
-        patience: for how long [s] it must.
+        patience: by how much less in sum over time [s] at least; if the way there costs more, by as much as that.
     """
 
     glue: float = 2e-3
-    stiff: float = 1.5e-3
+    stiff: float = 3e-3
     firm: float = 50.0
     opening: float = 0.05
     calm: float = 0.01
     margin: float = 0.03
-    patience: float = 0.25
+    patience: float = 0.0075
 
 
 class Arm(NamedTuple):

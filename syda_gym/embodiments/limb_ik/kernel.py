@@ -31,6 +31,8 @@ LEAST_GAIN = 1e-11
 """A step that promises less is not taken."""
 HALVINGS = 8
 """By how many halvings it is found how far a joint must be held back that another one cannot follow."""
+WAY = 4
+"""Poses on the way to another branch at which it is asked what the way costs."""
 WITHIN = 1.0 - 1e-9
 """Share of a joint's speed that is used, so that rounding never exceeds it."""
 SLACK = 1e-12
@@ -329,8 +331,8 @@ def refine(arm, q, target, lower, upper, anchor, hold, firm):
 
 
 @compiled
-def solve_arm(arm, target, q):
-    """The best pose of one arm for one frame, without regard to any other frame; returns the miss."""
+def solve_arm(arm, target, near, q):
+    """The best pose of one arm, among equally good ones the nearest to ``near``, in ``q``; returns the miss."""
     closed = 4 if len(arm.closed) == 4 else 0
     count = closed + len(arm.seeds)
     starts, misses = np.empty((count, len(q))), np.empty(count)
@@ -346,7 +348,7 @@ def solve_arm(arm, target, q):
         _project(arm, starts[row], arm.lower, arm.upper, arm.rest)
         look(arm, starts[row], found, columns, turning)
         misses[row] = _miss(found, target)
-        score = misses[row] + PULL * _away(starts[row], arm.rest)
+        score = misses[row] + PULL * _away(starts[row], near)
         if score < least:
             best, least = row, score
     if misses[best] < NEAR:
@@ -359,8 +361,8 @@ def solve_arm(arm, target, q):
             if misses[other] < misses[row]:
                 row = other
         misses[row] = math.inf
-        reached = refine(arm, starts[row], target, arm.lower, arm.upper, arm.rest, REST, 0.0)
-        score = reached + PULL * _away(starts[row], arm.rest)
+        reached = refine(arm, starts[row], target, arm.lower, arm.upper, near, REST, 0.0)
+        score = reached + PULL * _away(starts[row], near)
         if score < least:
             least, miss = score, reached
             copy(starts[row], q)
@@ -368,8 +370,24 @@ def solve_arm(arm, target, q):
 
 
 @compiled
+def _crossing(arm, start, goal, target):
+    """What the way to another pose costs: the time that it takes by the mean miss on it."""
+    on_the_way, found = np.empty(len(start)), np.empty(6)
+    columns, turning = np.empty((len(arm.movers), 6)), np.empty(len(arm.movers))
+    longest, total = 0.0, 0.0
+    for stop in range(WAY):
+        share = (stop + 1.0) / (WAY + 1.0)
+        for j in range(len(start)):
+            on_the_way[j] = start[j] + share * (goal[j] - start[j])
+            longest = max(longest, abs(goal[j] - start[j]) / arm.speed[j])
+        look(arm, on_the_way, found, columns, turning)
+        total += _miss(found, target)
+    return longest * total / WAY
+
+
+@compiled
 def follow_arm(arm, target, dt, limited, fresh, state):
-    """The next pose of one arm, in place in its state: pose, goal pose, patience [s], on the way, flexion.
+    """The next pose of one arm, in place in its state: pose, goal pose, regret [s], on the way, flexion.
 
     Args:
         arm: the arm.
@@ -389,7 +407,7 @@ def follow_arm(arm, target, dt, limited, fresh, state):
     z = target[0] * target[4] - target[1] * target[3]
     flexion = math.sqrt(x * x + y * y + z * z)
     if fresh:
-        solve_arm(arm, target, before)
+        solve_arm(arm, target, arm.rest, before)
         for j in range(n):
             state[j] = state[n + j] = before[j]
         state[2 * n], state[2 * n + 1], state[2 * n + 2] = 0.0, 0.0, flexion
@@ -416,9 +434,9 @@ def follow_arm(arm, target, dt, limited, fresh, state):
         # Where this branch leads without speed limits, and where the best of all branches is.
         copy(goal, other)
         along = refine(arm, goal, target, arm.lower, arm.upper, other, REST, 0.0)
-        best = solve_arm(arm, target, other)
-        patience = patience + dt if best < along - arm.habits.margin else 0.0
-        if patience > arm.habits.patience:
+        best = solve_arm(arm, target, before, other)
+        patience = max(0.0, patience + (along - best - arm.habits.margin) * dt)
+        if patience > max(arm.habits.patience, _crossing(arm, before, other, target)):
             copy(other, goal)
             patience, going = 0.0, True
         if going:  # another branch is never jumped to
@@ -439,7 +457,7 @@ def follow_arm(arm, target, dt, limited, fresh, state):
 def solve(arm, targets, frames):
     """Independent frames: targets (N, 6) to angles (N, n) of one arm."""
     for row in range(len(targets)):
-        solve_arm(arm, targets[row], frames[row])
+        solve_arm(arm, targets[row], arm.rest, frames[row])
 
 
 @compiled
