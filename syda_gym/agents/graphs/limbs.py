@@ -38,6 +38,7 @@ class LimbGraph(nn.Module):
         self.lower, self.upper = constant(arm.lower), constant(arm.upper)
         self.rest, self.reach = constant(arm.rest), constant(arm.speed * dt * kernel.WITHIN)
         self.speed = constant(arm.speed)
+        self.bends = torch.arange(self.joints) == int(arm.hinge)
         self.seeds = [constant(seed) for seed in arm.seeds]
         self.turns = constant(arm.turns)
         self.hold = arm.habits.glue * kernel.FRAME / dt
@@ -76,9 +77,12 @@ class LimbGraph(nn.Module):
         patience = torch.where(switch, 0.0 * patience, patience)
         going = (going | switch) & begun
         straight = self.limits.project(goal, lower, upper, before)
-        angles = torch.where(begun, torch.where(going, straight, near), other)
-        left = (straight - goal).abs().sum(dim=1, keepdim=True) > 1e-9
-        going = (going & left).to(torch.float64)
+        # The elbow bends as the limbs want it while the other joints are on their way.
+        fixed = (torch.where(self.bends, lower, straight), torch.where(self.bends, upper, straight))
+        crossed, miss = self.descent(straight, target, *fixed, straight, hold, 0.0 * firm, going)
+        angles = torch.where(begun, torch.where(going, crossed, near), other)
+        left = (crossed - goal).abs().sum(dim=1, keepdim=True) > kernel.SAME
+        going = (going & left & (miss >= self.arm.habits.calm)).to(torch.float64)
         return angles, torch.cat([angles, goal, patience, going, bend], dim=1)
 
     def _crossing(self, start: Tensor, goal: Tensor, target: Tensor) -> Tensor:

@@ -37,9 +37,9 @@ class Habits(NamedTuple):
     """
 
     glue: float = 2e-3
-    stiff: float = 3e-3
+    stiff: float = 2e-3
     firm: float = 50.0
-    opening: float = 0.05
+    opening: float = 0.1
     calm: float = 0.01
     margin: float = 0.03
     patience: float = 0.0075
@@ -54,6 +54,7 @@ class Arm(NamedTuple):
         carriers: joints that carry shoulder, elbow and wrist ``(3,)``; -1 is the torso.
         points: where those are from their joints at the zero pose ``(3, 3)`` [m].
         movers: joints that turn upper arm or forearm ``(m,)``.
+        hinge: the joint that bends the elbow.
         twisting: 1 for those that turn the elbow's own axis about the upper arm, else 0 ``(m,)``.
         lower: lower limits ``(n,)`` [rad].
         upper: upper limits ``(n,)`` [rad].
@@ -74,6 +75,7 @@ class Arm(NamedTuple):
     carriers: Indices
     points: FloatArray
     movers: Indices
+    hinge: int
     twisting: FloatArray
     lower: FloatArray
     upper: FloatArray
@@ -102,14 +104,15 @@ def of_robot(robot: Robot, index: int, habits: Habits) -> Arm:
     rest = np.ascontiguousarray(robot.clamp(robot.rest)[0, part])
     governed, governors, rows, table = _couplings(robot, part)
     movers = np.array(moving_joints(chain), dtype=np.int64)
-    closed = _closed_joints(chain, movers)
+    closed, hinge = _closed_joints(chain, movers), _hinge(chain, movers)
     return Arm(
         steps=steps[:reach],
         axes=axes[:reach],
         carriers=carriers,
         points=points,
         movers=movers,
-        twisting=(movers < _hinge(chain, movers)).astype(np.float64),
+        hinge=hinge,
+        twisting=(movers < hinge).astype(np.float64),
         lower=chain.lower.copy(),
         upper=chain.upper.copy(),
         rest=rest,

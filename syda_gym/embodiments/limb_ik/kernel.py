@@ -31,6 +31,8 @@ LEAST_GAIN = 1e-11
 """A step that promises less is not taken."""
 HALVINGS = 8
 """By how many halvings it is found how far a joint must be held back that another one cannot follow."""
+SAME = 1e-3
+"""How near a pose must be to the one that it goes to [rad, sum over joints]."""
 WAY = 4
 """Poses on the way to another branch at which it is asked what the way costs."""
 WITHIN = 1.0 - 1e-9
@@ -445,7 +447,12 @@ def follow_arm(arm, target, dt, limited, fresh, state):
                 lower[j], upper[j] = max(lower[j], before[j] - reach), min(upper[j], before[j] + reach)
             copy(goal, q)
             _project(arm, q, lower, upper, before)
-            going = _away(q, goal) > 1e-9
+            copy(q, other)
+            for j in range(n):  # the elbow bends as the limbs want it while the other joints are on their way
+                if j != arm.hinge:
+                    lower[j] = upper[j] = q[j]
+            miss = refine(arm, q, target, lower, upper, other, hold, 0.0)
+            going = miss >= arm.habits.calm and _away(q, goal) > SAME
         elif not limited:
             copy(q, goal)
     for j in range(n):

@@ -44,15 +44,15 @@ def angles(robot, frames, directions):
     return np.degrees(np.arctan2(across, (found * wanted).sum(axis=-1)))
 
 
-def wandering(seed, count, arms=2, speed=1.0):
-    """Limb directions that turn smoothly, ``(count, arms, 2, 3)``."""
+def wandering(seed, count, arms=2, speed=1.0, calm=1.0):
+    """Limb directions that turn smoothly, ``(count, arms, 2, 3)``; the calmer, the nearer to forward and down."""
     rng = np.random.default_rng(seed)
     times = np.arange(count)[:, None, None, None] / FPS
     waves = [
         rng.normal(size=(1, arms, 2, 3)) * np.sin(speed * rng.uniform(0.5, 3.0) * times + rng.uniform(0, 6))
         for _ in range(3)
     ]
-    return unit(sum(waves) + np.array([0.6, 0.0, -0.8]))
+    return unit(sum(waves) + calm * np.array([0.6, 0.0, -0.8]))
 
 
 @pytest.fixture(scope="module")
@@ -202,9 +202,10 @@ def test_arms_with_many_joints_follow_what_they_can_reach(name, wide, clavicle):
     robot = {"wide": wide, "clavicle": clavicle}[name]
     errors = []
     for seed in range(4):
-        directions = wandering(seed, 150, speed=0.4)
-        path = LimbIK.of(robot).sequence(directions, FPS)
-        errors.append(angles(robot, path, directions)[15:].mean())
+        directions = wandering(seed, 150, speed=0.4, calm=3.0)
+        ik = LimbIK.of(robot)
+        path = ik.follow(directions[None], ik.begin(), 1 / FPS, limited=False)[0][0]
+        errors.append(angles(robot, path, directions).mean())
     assert np.mean(errors) < 1.0
 
 
@@ -215,7 +216,7 @@ def test_a_joint_before_the_shoulder_helps(clavicle):
 
 
 def test_a_slow_motion_gives_a_smooth_path(wide):
-    directions = wandering(5, 300, speed=0.2)
+    directions = wandering(5, 300, speed=0.2, calm=3.0)
     ik = LimbIK.of(wide)
     path = ik.follow(directions[None], ik.begin(), 1 / FPS, limited=False)[0][0]
     turned = np.degrees(np.arccos(np.clip((directions[1:] * directions[:-1]).sum(-1), -1, 1))).max(axis=(1, 2))
@@ -226,7 +227,7 @@ def test_a_slow_motion_gives_a_smooth_path(wide):
 @pytest.mark.parametrize("limbs", [((1, 0.1, -0.1), (1, 0, 0)), ((0, 0.1, -1), (0.1, 0.05, -1))])
 def test_the_yaw_of_a_straight_elbow_holds_still_under_noise(limbs):
     pepper = known("pepper")
-    rng, points = np.random.default_rng(0), np.zeros((400, 2, 3, 3))
+    rng, points = np.random.default_rng(0), np.zeros((600, 2, 3, 3))
     for side, sign in enumerate((1.0, -1.0)):
         for limb, length in ((0, 0.28), (1, 0.25)):
             along = unit(np.array(limbs[limb]) * (1.0, sign, 1.0))
@@ -234,7 +235,7 @@ def test_the_yaw_of_a_straight_elbow_holds_still_under_noise(limbs):
     points += rng.normal(0.0, 0.01, points.shape)
     path = LimbIK.of(pepper).sequence(np.diff(points, axis=2), FPS)
     yaws = [pepper.joint_names.index(name) for name in ("LElbowYaw", "RElbowYaw")]
-    assert np.degrees(path[100:, yaws].std(axis=0)).max() < 3.0
+    assert np.degrees(path[300:, yaws].std(axis=0)).max() < 3.0
 
 
 def test_an_elbow_that_bends_turns_its_yaw_in_time():
@@ -247,7 +248,8 @@ def test_an_elbow_that_bends_turns_its_yaw_in_time():
     directions = np.stack([left, left * [1.0, -1.0, 1.0]], axis=1)
     missed = angles(pepper, LimbIK.of(pepper).sequence(directions, FPS), directions)
     assert missed[-1].max() < 1.0
-    assert missed.max() < 25.0
+    assert missed.max() < 60.0
+    assert (missed > 15.0).any(axis=(1, 2)).sum() < 25  # frames
 
 
 def test_another_branch_is_taken_after_a_while_and_within_speeds(wide):
