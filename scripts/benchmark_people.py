@@ -313,20 +313,20 @@ def person(robot: Robot, arms: Sequence[Bones], body: HumanSkeleton, frames: Flo
 
 
 def straight_arms(robot: Robot, noise: float = 0.01) -> dict[str, float]:
-    """Standard deviation [deg] of every joint while a person holds both arms straight under noise [m]."""
+    """Standard deviation [deg] of every joint while both arms are held straight under noise [m], from ten seconds on."""
     body = catalog.get("adult")
     assert isinstance(body, HumanSkeleton)
     rng, worst = np.random.default_rng(0), {}
     poses = {"forward": ((1, 0.1, -0.1), (1, 0, 0)), "hanging": ((0, 0.1, -1), (0.1, 0.05, -1))}
     for name, limbs in poses.items():
-        points = np.repeat(body.arm_points(body.standing()), 300, axis=0)
+        points = np.repeat(body.arm_points(body.standing()), 600, axis=0)
         for side, sign in enumerate((1.0, -1.0)):
             for limb, (x, y, z) in enumerate(limbs):
                 along = np.array([x, sign * y, z]) / np.linalg.norm((x, y, z))
                 points[:, side, limb + 1] = points[:, side, limb] + body.arm_lengths[side, limb] * along
         points = points + rng.normal(0.0, noise, points.shape)
         path = geometric_mapping(body, robot).sequence(body.frames_from_points(points), FPS)
-        spread = np.degrees(path[60:].std(axis=0))
+        spread = np.degrees(path[300:].std(axis=0))
         for joint, value in zip(robot.joint_names, spread, strict=True):
             if joint.endswith("ElbowYaw"):
                 worst[f"{name} {joint}"] = float(value)

@@ -51,7 +51,7 @@ class FrameStream:
         Raises:
             EmbodimentError: not a frame of the source, or values that are not finite; the past stays as it was.
         """
-        current = self.mapping.source.check(frame)[0]
+        current: FloatArray = self.mapping.source.check(frame)[0]
         step = dt if dt is not None or self.fps is None else 1.0 / self.fps
         done = []
         for link in self._links:  # a frame that some link cannot take leaves all of them as they were

@@ -35,14 +35,19 @@ def encoder_of(coder: Coder) -> nn.Module:
     return _modules(coder)[0](coder)
 
 
-def decoder_of(coder: Coder, dt: float) -> nn.Module:
-    """The module that decodes: ``(codes, state, fresh)`` to frames and the next state, frames being ``dt`` [s] apart.
+def decoder_of(coder: Coder, dt: float) -> tuple[nn.Module, int]:
+    """The module that decodes frames ``dt`` [s] apart, and the size of its state.
+
+    It makes frames and the next state of ``(codes, state, fresh)``.
 
     Raises:
         AgentError: this kind of code has no graph.
     """
     kind = _modules(coder)[1]
-    return kind(coder, dt) if kind is _DecodeRobotArms else _Stateless(kind(coder))
+    if isinstance(coder, RobotArmCoder):
+        arms = _DecodeRobotArms(coder, dt)
+        return arms, arms.state_size
+    return _Stateless(kind(coder)), 0
 
 
 def _modules(coder: Coder) -> tuple[type[nn.Module], type[nn.Module]]:
@@ -56,8 +61,6 @@ def _modules(coder: Coder) -> tuple[type[nn.Module], type[nn.Module]]:
 
 class _Stateless(nn.Module):
     """A decoder that remembers nothing."""
-
-    state_size = 0
 
     def __init__(self, decoder: nn.Module) -> None:
         super().__init__()
@@ -200,6 +203,7 @@ class _DecodeRobotArms(nn.Module):
         self.limbs = nn.ModuleList(
             LimbGraph(chain, arm, dt) for chain, arm in zip(robot.chains, solver.arms, strict=True)
         )
+        self.sizes = [2 * len(arm.lower) + 3 for arm in solver.arms]
         self.state_size = solver.state_size
         self.signs = _signs(coder.sides)[:, 0]
         self.rest = constant(coder.rest)
@@ -210,10 +214,8 @@ class _DecodeRobotArms(nn.Module):
     def forward(self, codes: Tensor, state: Tensor, fresh: Tensor) -> tuple[Tensor, Tensor]:
         frames = self.rest + 0.0 * codes[:, 0, :1]
         columns = list(torch.split(frames, 1, dim=1))
-        after, first = [], 0
-        for arm, limb in enumerate(self.limbs):
-            own = state[:, first : first + limb.state_size]
-            first += limb.state_size
+        after = []
+        for arm, (limb, own) in enumerate(zip(self.limbs, torch.split(state, self.sizes, dim=1), strict=True)):
             if arm not in self.arms:
                 after.append(own)
                 continue

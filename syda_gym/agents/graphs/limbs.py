@@ -72,7 +72,7 @@ class LimbGraph(nn.Module):
         other, best = self._solve(target, before, ~calm)
         patience = (patience + (reached - best - self.arm.habits.margin) * self.dt).clamp(min=0.0)
         patience = torch.where(~calm & begun, patience, 0.0 * best)
-        switch = patience > self._crossing(before, other, target).clamp(min=self.arm.habits.patience)
+        switch = patience > self._crossing(before, other, target, reached).clamp(min=self.arm.habits.patience)
         goal = torch.where(switch | ~begun, other, torch.where(calm, near, along))
         patience = torch.where(switch, 0.0 * patience, patience)
         going = (going | switch) & begun
@@ -85,12 +85,14 @@ class LimbGraph(nn.Module):
         going = (going & left & (miss >= self.arm.habits.calm)).to(torch.float64)
         return angles, torch.cat([angles, goal, patience, going, bend], dim=1)
 
-    def _crossing(self, start: Tensor, goal: Tensor, target: Tensor) -> Tensor:
+    def _crossing(self, start: Tensor, goal: Tensor, target: Tensor, staying: Tensor) -> Tensor:
         """``kernel._crossing``."""
         way, total = goal - start, 0.0 * target[:, :1]
         for stop in range(kernel.WAY):
-            found = self.kinematics.limbs(start + (stop + 1.0) / (kernel.WAY + 1.0) * way)[0]
-            total = total + miss_of(found, target)
+            pose = start + (stop + 1.0) / (kernel.WAY + 1.0) * way
+            bent = torch.where(self.bends, start, pose)
+            misses = [miss_of(self.kinematics.limbs(each)[0], target) for each in (pose, bent)]
+            total = total + (torch.minimum(*misses) - staying).clamp(min=0.0)
         longest = (way.abs() / self.speed).max(dim=1, keepdim=True)[0]
         return longest * total / kernel.WAY
 
@@ -99,9 +101,9 @@ class LimbGraph(nn.Module):
         closed = self._closed_form(target) if len(self.arm.closed) else []
         seeds = [seed + 0.0 * target[:, :1] for seed in self.seeds]
         count, rows = len(closed) + len(seeds), target.shape[0]
-        box = [(limit + 0.0 * target[:, :1]).repeat(count, 1) for limit in (self.lower, self.upper)]
+        lower, upper = ((limit + 0.0 * target[:, :1]).repeat(count, 1) for limit in (self.lower, self.upper))
         anchor = near.repeat(count, 1)
-        starts = self.limits.project(torch.cat([*closed, *seeds]), *box, (self.rest + 0.0 * anchor))
+        starts = self.limits.project(torch.cat([*closed, *seeds]), lower, upper, self.rest + 0.0 * anchor)
         misses = miss_of(self.kinematics.limbs(starts)[0], target.repeat(count, 1)).reshape(count, -1)
         starts = starts.reshape(count, -1, self.joints)
         best, least, miss = starts[0], self._score(misses[0, :, None], starts[0], near), misses[0, :, None]
@@ -116,7 +118,7 @@ class LimbGraph(nn.Module):
         order = torch.topk(misses, some, dim=0, largest=False, sorted=True)[1]
         chosen = torch.gather(starts, 0, order[:, :, None].repeat(1, 1, self.joints)).reshape(-1, self.joints)
         active = (wanted & (miss >= kernel.NEAR)).repeat(some, 1)
-        box = [limit[: some * rows] for limit in (*box, anchor)]
+        box = [limit[: some * rows] for limit in (lower, upper, anchor)]
         still = 0.0 * chosen[:, :1]
         found, reached = self.descent(
             chosen, target.repeat(some, 1), box[0], box[1], box[2], kernel.REST + still, still, active

@@ -93,15 +93,16 @@ class ArmLimits(nn.Module):
         self.governed = [int(joint) for joint in arm.governed]
         self.governors = [int(joint) for joint in arm.governors]
         tables = [arm.table[a:b] for a, b in zip(arm.rows[:-1], arm.rows[1:], strict=True)]
-        self.ranges = nn.ModuleList(
+        self.each = [
             CoupledRange((joint, by, table[:, 0], table[:, 1], table[:, 2]))
             for joint, by, table in zip(self.governed, self.governors, tables, strict=True)
-        )
+        ]
+        self.ranges = nn.ModuleList(self.each)
 
     def box(self, angles: Tensor, lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor, list[tuple[Tensor, Tensor]]]:
         """What the coupled limits leave of a box, and how its sides move with the governors."""
         slopes = []
-        for joint, coupled in zip(self.governed, self.ranges, strict=True):
+        for joint, coupled in zip(self.governed, self.each, strict=True):
             own = slice(joint, joint + 1)
             (low, high), (rise, climb) = coupled(angles), coupled.slopes(angles)
             slopes.append((
@@ -150,7 +151,7 @@ class ArmLimits(nn.Module):
     def project(self, angles: Tensor, lower: Tensor, upper: Tensor, allowed: Tensor) -> Tensor:
         """``kernel._project``: into the box and the coupled limits, governors held back where need be."""
         angles = minimum(maximum(angles, lower), upper)
-        for joint, by, coupled in zip(self.governed, self.governors, self.ranges, strict=True):
+        for joint, by, coupled in zip(self.governed, self.governors, self.each, strict=True):
             own, lead = slice(joint, joint + 1), slice(by, by + 1)
             low, high = coupled(angles)
             held = maximum(low, lower[:, own]) > minimum(high, upper[:, own])
@@ -167,10 +168,10 @@ class ArmLimits(nn.Module):
             none = low > high
             low, high = torch.where(none, allowed[:, own], low), torch.where(none, allowed[:, own], high)
             angles = _put(angles, joint, minimum(maximum(angles[:, own], low), high))
-        for joint, coupled in zip(self.governed, self.ranges, strict=True):
-            own = angles[:, joint : joint + 1]
+        for joint, coupled in zip(self.governed, self.each, strict=True):
+            angle = angles[:, joint : joint + 1]
             low, high = coupled(angles)
-            angles = torch.where((own < low - 1e-12) | (own > high + 1e-12), allowed, angles)
+            angles = torch.where((angle < low - 1e-12) | (angle > high + 1e-12), allowed, angles)
         return angles
 
 

@@ -36,8 +36,9 @@ class MappingGraph(nn.Module):
     def __init__(self, mapping: Mapping, dt: float) -> None:
         super().__init__()
         links = mapping.links if isinstance(mapping, ChainMapping) else (mapping,)
-        self.links = nn.ModuleList(_Link(link, dt) for link in links)
-        self.sizes = [link.state_size for link in self.links]
+        parts = [_Link(link, dt) for link in links]
+        self.links = nn.ModuleList(parts)
+        self.sizes = [part.state_size for part in parts]
         self.state_size = sum(self.sizes)
 
     def forward(self, frames: Tensor, state: Tensor, fresh: Tensor) -> tuple[Tensor, Tensor]:
@@ -57,9 +58,8 @@ class _Link(nn.Module):
         self.codes = nn.Sequential(
             encoder_of(link.source_coder), regressor_graph(link.regressor, link.source_coder.width)
         )
-        self.decoder = decoder_of(link.target_coder, dt)
+        self.decoder, self.state_size = decoder_of(link.target_coder, dt)
         self.clamp = robot_clamp(link.target) if isinstance(link.target, Robot) else nn.Identity()
-        self.state_size = int(self.decoder.state_size)
 
     def forward(self, frames: Tensor, state: Tensor, fresh: Tensor) -> tuple[Tensor, Tensor]:
         mapped, after = self.decoder(self.codes(frames), state, fresh)

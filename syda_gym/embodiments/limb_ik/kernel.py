@@ -372,8 +372,11 @@ def solve_arm(arm, target, near, q):
 
 
 @compiled
-def _crossing(arm, start, goal, target):
-    """What the way to another pose costs: the time that it takes by the mean miss on it."""
+def _crossing(arm, start, goal, target, staying):
+    """What the way to another pose costs beyond staying: the time that it takes by the mean miss on it.
+
+    The elbow goes along, or stays as bent as it is; whatever misses less.
+    """
     on_the_way, found = np.empty(len(start)), np.empty(6)
     columns, turning = np.empty((len(arm.movers), 6)), np.empty(len(arm.movers))
     longest, total = 0.0, 0.0
@@ -383,7 +386,10 @@ def _crossing(arm, start, goal, target):
             on_the_way[j] = start[j] + share * (goal[j] - start[j])
             longest = max(longest, abs(goal[j] - start[j]) / arm.speed[j])
         look(arm, on_the_way, found, columns, turning)
-        total += _miss(found, target)
+        miss = _miss(found, target)
+        on_the_way[arm.hinge] = start[arm.hinge]
+        look(arm, on_the_way, found, columns, turning)
+        total += max(0.0, min(miss, _miss(found, target)) - staying)
     return longest * total / WAY
 
 
@@ -438,7 +444,7 @@ def follow_arm(arm, target, dt, limited, fresh, state):
         along = refine(arm, goal, target, arm.lower, arm.upper, other, REST, 0.0)
         best = solve_arm(arm, target, before, other)
         patience = max(0.0, patience + (along - best - arm.habits.margin) * dt)
-        if patience > max(arm.habits.patience, _crossing(arm, before, other, target)):
+        if patience > max(arm.habits.patience, _crossing(arm, before, other, target, along)):
             copy(other, goal)
             patience, going = 0.0, True
         if going:  # another branch is never jumped to

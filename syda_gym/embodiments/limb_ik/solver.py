@@ -65,7 +65,7 @@ class LimbIK:
 
         self.robot = robot
         self.arms = tuple(of_robot(robot, index, habits or Habits()) for index in range(len(robot.chains)))
-        self._kernel = kernel
+        self._kernel: Any = kernel
         inside = [range(part.start, part.stop) for part in robot.arm_slices]
         self._across = any(not any(row[0] in arm and row[1] in arm for arm in inside) for row in robot._coupled)
 

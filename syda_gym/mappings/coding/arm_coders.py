@@ -239,13 +239,11 @@ class RobotArmCoder(Coder):
         """The same for one frame ``(n,)`` from finite codes ``(arms, 6 + extras)``; live use decodes frame by frame."""
         return self._completed_one(self._ik.solve(np.array([self._wanted_one(codes)]))[0].tolist(), codes)
 
-    def begin(self) -> LimbState:
-        """The state of the limb solver before a clip."""
+    def begin(self) -> Any:
+        """The state of the limb solver before a clip, a ``LimbState``."""
         return self._ik.begin()
 
-    def follow(
-        self, codes: FloatArray, memory: LimbState, dt: float | None, limited: bool
-    ) -> tuple[FloatArray, LimbState]:
+    def follow(self, codes: FloatArray, memory: Any, dt: float | None, limited: bool) -> tuple[FloatArray, Any]:
         """Joint angles ``(N, n)`` within the limits of frames in time order, see ``LimbIK.follow``."""
         if len(codes) == 1:
             frame, memory = self.follow_one(codes[0].tolist(), memory, dt, limited)
