@@ -313,7 +313,7 @@ def person(robot: Robot, arms: Sequence[Bones], body: HumanSkeleton, frames: Flo
 
 
 def straight_arms(robot: Robot, noise: float = 0.01) -> dict[str, float]:
-    """Standard deviation [deg] of every joint while both arms are held straight under noise [m], from ten seconds on."""
+    """Standard deviation [deg] of every joint with both arms held straight under noise [m], from ten seconds on."""
     body = catalog.get("adult")
     assert isinstance(body, HumanSkeleton)
     rng, worst = np.random.default_rng(0), {}

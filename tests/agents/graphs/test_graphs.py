@@ -37,16 +37,19 @@ def motions():
 
 
 def worst(mapping, frames) -> float:
-    """Largest difference between graph and mapping; live frames come one by one, in time order."""
-    stream = FrameStream(mapping, 10.0)
-    expected = np.stack([stream(frame) for frame in frames])
+    """Largest difference between graph and mapping, over sequences of ten frames that the graph takes side by side."""
+    clips = frames.reshape(-1, 10, frames.shape[1])
+    expected = []
+    for clip in clips:
+        stream = FrameStream(mapping, 10.0)
+        expected.append([stream(frame) for frame in clip])
     graph = MappingGraph(mapping, 0.1)
-    state, found = torch.zeros(1, graph.state_size, dtype=torch.float64), []
-    for index, frame in enumerate(torch.as_tensor(frames)):
-        fresh = torch.full((1, 1), float(index == 0), dtype=torch.float64)
-        mapped, state = graph(frame[None], state, fresh)
-        found.append(mapped.numpy()[0])
-    return float(np.abs(np.array(found) - expected).max())
+    state, found = torch.zeros(len(clips), graph.state_size, dtype=torch.float64), []
+    for index in range(10):
+        fresh = torch.full((len(clips), 1), float(index == 0), dtype=torch.float64)
+        mapped, state = graph(torch.as_tensor(clips[:, index]), state, fresh)
+        found.append(mapped.numpy())
+    return float(np.abs(np.stack(found, axis=1) - np.array(expected)).max())
 
 
 def odd(frames, count=40, size=0.05):
