@@ -29,6 +29,7 @@ _GENTLE = 0.2  # speed factor at the beginning of a soft start
 _ARRIVED = 1e-3  # rad
 _TO_FULL_SPEED = 0.2  # s; from a standstill, where no acceleration is given
 _STALL = 2.0  # periods without a step after which the start is gentle again
+_SHORTEST = 1e-3  # s; frames that arrive together are taken to be so far apart
 
 
 class TeleoperationLoop:
@@ -235,8 +236,9 @@ class TeleoperationLoop:
         if doubted is None:
             return float("nan"), False
         frame, trust = doubted
+        passed, anew = self._passed(tick)
         try:
-            mapped = self._guarded(self.calibration.apply(frame))
+            mapped = self._guarded(self.calibration.apply(frame), passed)
         except (SydaError, ArithmeticError, ValueError) as error:  # a robot in motion must survive any mapping
             reasons.append(f"mapping: {' '.join(str(error).split())[:200] or type(error).__name__}")
             return float("nan"), False
@@ -251,7 +253,7 @@ class TeleoperationLoop:
             reasons.append("unfamiliar: slowed")
             trust = min(trust, self.settings.unfamiliar)
         self._trust = trust
-        self._aim(mapped.angles, tick)
+        self._aim(mapped.angles, tick, passed, anew)
         return mapped.bound, True
 
     def _doubt(self, tick: Tick, frame: FloatArray, reasons: list[str]) -> tuple[FloatArray, float] | None:
@@ -286,15 +288,21 @@ class TeleoperationLoop:
         if self.state is State.CALIBRATING or self.state is State.FOLLOWING:
             self.state = State.HOLDING
 
-    def _aim(self, angles: FloatArray, tick: Tick) -> None:
-        """Filters the mapped angles into the target and feeds the watchdog."""
+    def _passed(self, tick: Tick) -> tuple[float, bool]:
+        """Time since the frame before [s], and whether that one is not the operator's past any more."""
         passed = self._targets.advance(tick.now, tick.sent)
-        fresh = self._watchdog.verdict(tick.now) is not Watch.FOLLOW
+        anew = self._watchdog.verdict(tick.now) is not Watch.FOLLOW or not 0.0 <= passed < 1.0
+        if anew:
+            self._guarded.reset()
+        return max(passed, _SHORTEST), anew
+
+    def _aim(self, angles: FloatArray, tick: Tick, passed: float, anew: bool) -> None:
+        """Filters the mapped angles into the target and feeds the watchdog."""
         self._watchdog.feed(tick.now)
         if self._filter is None:
             self._target = angles
             return
-        if fresh or not 0.0 <= passed < 1.0:  # the filter's past is not the operator's any more
+        if anew:
             self._filter.reset(angles)
         self._target = self._filter(angles, passed)
 
