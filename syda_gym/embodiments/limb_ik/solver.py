@@ -61,11 +61,15 @@ class LimbIK:
     """
 
     def __init__(self, robot: Robot, habits: Habits | None = None) -> None:
-        from syda_gym.embodiments.limb_ik import kernel  # numba is imported where arms are solved, not before
+        from syda_gym.embodiments.limb_ik import kernel
+        from syda_gym.embodiments.limb_ik.compiling import (
+            first_call,  # numba is imported where arms are solved, not before
+        )
 
         self.robot = robot
         self.arms = tuple(of_robot(robot, index, habits or Habits()) for index in range(len(robot.chains)))
         self._kernel: Any = kernel
+        self._call = first_call
         inside = [range(part.start, part.stop) for part in robot.arm_slices]
         self._across = any(not any(row[0] in arm and row[1] in arm for arm in inside) for row in robot._coupled)
 
@@ -98,7 +102,7 @@ class LimbIK:
         frames = np.empty((len(unit), self.robot.n_features))
         for index, (arm, part) in enumerate(zip(self.arms, self.robot.arm_slices, strict=True)):
             angles = np.empty((len(unit), len(arm.lower)))
-            self._kernel.solve(arm, np.ascontiguousarray(unit[:, index]).reshape(-1, 6), angles)
+            self._call(self._kernel.solve, arm, np.ascontiguousarray(unit[:, index]).reshape(-1, 6), angles)
             frames[:, part] = angles
         return self.robot.clamp(frames) if self._across else frames
 
@@ -144,7 +148,7 @@ class LimbIK:
             last = first + 2 * len(arm.lower) + 3
             own, angles = np.ascontiguousarray(numbers[:, first:last]), np.empty((count, length, len(arm.lower)))
             wanted = np.ascontiguousarray(unit[:, :, index]).reshape(count, length, 6)
-            self._kernel.follow(arm, wanted, steps, limited and dt is not None, state.fresh, own, angles)
+            self._call(self._kernel.follow, arm, wanted, steps, limited and dt is not None, state.fresh, own, angles)
             numbers[:, first:last], frames[:, :, part], first = own, angles, last
         if self._across:
             frames = self.robot.clamp(frames.reshape(-1, frames.shape[2])).reshape(frames.shape)
