@@ -206,7 +206,7 @@ def address(written: Sequence[str], what: str) -> Check:
         written: how they are written, for example ``udp:PORT``.
         what: ``"source"`` or ``"sink"``.
     """
-    kinds = {text.partition(":")[0] for text in written}
+    kinds = {text.partition(":")[0].partition("[")[0] for text in written}
 
     def check(values: Any) -> Any:
         for text in [values] if isinstance(values, str) else values or ():
