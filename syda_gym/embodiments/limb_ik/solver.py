@@ -61,7 +61,6 @@ class LimbIK:
     """
 
     def __init__(self, robot: Robot, habits: Habits | None = None) -> None:
-
         self.robot = robot
         self.arms = tuple(of_robot(robot, index, habits or Habits()) for index in range(len(robot.chains)))
         inside = [range(part.start, part.stop) for part in robot.arm_slices]
