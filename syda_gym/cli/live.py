@@ -43,7 +43,7 @@ robot_app = Program(help="Add your own robot, look at it, list those that are kn
 
 @robot_app.command("add")
 def _robot_add(
-    urdf: Annotated[Path, typer.Argument(help="Any URDF, with primitives or meshes.")],
+    urdf: Annotated[Path, typer.Argument(help="Any URDF (or xacro, MJCF, or a description of yours).")],
     name: Annotated[str | None, typer.Option(help="The new name; by default the file's.")] = None,
     left: Annotated[str | None, typer.Option(help="Link at the end of the left arm, if the search is wrong.")] = None,
     right: Annotated[str | None, typer.Option(help="Link at the end of the right arm.")] = None,
@@ -59,16 +59,21 @@ def _robot_add(
     added = add_robot(urdf, name, left=left, right=right, torso=torso, replace_existing=replace)
     _print_robot(added.robot)
     say = console()
-    degrees = math.degrees(added.pointing_error)
+    verdict = added.verdict
+    colour = {"good": "green", "fair": "yellow", "doubtful": "red"}[verdict.word]
     say.print(
-        f"it points its limbs as a person does within {degrees:.1f} degrees on average (poses in front and beside)"
+        f"[{colour}]{verdict.word}[/]: it points its limbs as a person does within {math.degrees(verdict.error):.1f} degrees "
+        f"on average (upper arms {math.degrees(verdict.upper):.1f}, forearms {math.degrees(verdict.fore):.1f})"
     )
+    if verdict.reason:
+        say.print(f"likely reason: {verdict.reason}", markup=False)
     for notice in added.notices:
         say.print(f"- {notice}", markup=False)
     say_written("description", added.description, "(edit it if something is wrong)")
     say_written("picture", added.picture, "(the coloured arms must lie on the robot's)")
     say.print(
-        f"try it: syda-gym teleop --robot {added.robot.name} --method geometric --sink video:{added.robot.name}.mp4",
+        f"try it: syda-gym teleop --robot {added.robot.name} --method geometric --action wave_side --seconds 8 "
+        f"--sink video:{added.robot.name}.mp4",
         soft_wrap=True,
     )
     if suggest:

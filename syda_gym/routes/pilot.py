@@ -193,6 +193,10 @@ class Pilot:
             return PlannedRoute(bodies, float(np.nan))
 
     def _body(self, name: str) -> Embodiment:
+        if self._given is not None:  # its bodies need no name in any catalog
+            for body in (self._given.source, self._given.target):
+                if body.name == name:
+                    return body
         return self.motions.bodies[name] if name in self.motions.bodies else catalog.get(name)
 
     def _link(self, a: str, b: str) -> Mapping:

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.embodiments import catalog
+from syda_gym.embodiments.catalog import is_robot_file
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.envs.task.disturbances import freeze_elbow_yaw
@@ -22,6 +24,7 @@ from syda_gym.errors import EmbodimentError, MappingError, MotionError, OptionEr
 from syda_gym.mappings.limits import limit_speed, step_towards
 from syda_gym.motions.clip import MotionClip, Motions, Take
 from syda_gym.motions.loading import load_motions, resampled
+from syda_gym.routes.choice import geometric_mapping
 from syda_gym.routes.pilot import Pilot, PlannedRoute
 
 __all__ = ["ClipEntry", "Repertoire"]
@@ -68,7 +71,7 @@ class Repertoire:
             motions,
             self.operator.name,
             robot.name,
-            mapping=options.mapping,
+            mapping=_mapping(motions, options, self.operator, robot),
             preset=options.preset,
             held_out=options.held_out,
             via=options.via,
@@ -174,18 +177,33 @@ class Repertoire:
 
 
 def _body(motions: Motions, body: object, what: str, *, needed: bool = True) -> Embodiment:
+    if not isinstance(body, Embodiment) and str(body) not in motions.bodies and is_robot_file(body):
+        body = catalog.resolve(str(body))
     name = body.name if isinstance(body, Embodiment) else str(body)
     if name in motions.bodies:
         found = motions.bodies[name]
         if isinstance(body, Embodiment) and body != found:
             raise EmbodimentError(f"{what} {name!r} differs from the body of that name in {motions.name}")
         return found
+    if needed and what == "robot" and (isinstance(body, Embodiment) or name in catalog.names()):
+        raise EmbodimentError(
+            f"robot={name!r}: {motions.name} has no motion of it; pass reference='mapped' to track what the mapping makes of "
+            "the operator"
+        )
     if needed:
         raise EmbodimentError(
             f"{what}={name!r}: {motions.name} has no motion of it; {nearest_name(name, motions.bodies)}"
             + (". With reference='mapped' the robot needs no motion of its own" if what == "robot" else "")
         )
     return catalog.resolve(body)  # type: ignore[arg-type]
+
+
+def _mapping(motions: Motions, options: TeleopOptions, operator: Embodiment, robot: Robot) -> Any:
+    """The mapping that was asked for; the unfitted one where nothing was recorded that another could be fitted on."""
+    unfitted = options.mapping == "syda" and options.preset is None  # the defaults: nothing else was asked for
+    if not unfitted or robot.name in motions.bodies or options.route != "auto":
+        return options.mapping
+    return geometric_mapping(operator, robot)
 
 
 def _clips(

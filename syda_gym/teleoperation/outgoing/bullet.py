@@ -89,7 +89,7 @@ class BulletSink(Sink):
             raise OptionError(
                 "the sink 'window' needs a display ($DISPLAY is not set); use 'bullet' or 'video:FILE.mp4'"
             )
-        view = CameraView.resolve({"operator": False, "distance": 1.6 * self.robot.height, **self.camera})
+        view = CameraView.resolve({"operator": False, **self.camera})
         if self.window:
             self._eye = Window(self.robot, self.operator or self.robot, view, float(self.rates.control_hz))
         elif self.video is not None:
