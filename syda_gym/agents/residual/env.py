@@ -15,7 +15,7 @@ from syda_gym.agents.classical.projection import capsule_model
 from syda_gym.agents.interface import Reading
 from syda_gym.agents.learned.policy import feature_count, policy_features
 from syda_gym.agents.residual.costs import CostWeights
-from syda_gym.agents.streams.streams import Streams, read_rows
+from syda_gym.agents.streams.streams import Past, Streams, read_rows
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.simulation.making import make_world
 from syda_gym.simulation.rates import Rates
@@ -85,6 +85,7 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
         self._below: FloatArray = np.zeros((count, n))
         self._shadow_below: FloatArray = np.zeros((count, n))
         self._trail: FloatArray = np.zeros((4, 2 * count, self._targets.shape[2], 3))
+        self._past = Past(self.interface, 2 * count)
         self.rng = np.random.default_rng(0)
 
         self._begin_all()
@@ -109,6 +110,7 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
         count, n = self.num_envs, self.interface.n
         self._correction = self.smoothing * self._correction + (1.0 - self.smoothing) * self._actions
         below = self._below
+        self._past.add(self._base_of_both(), self.world.pose[:, :n])
         command = limited(self.interface, below + self.scale * self._correction, below, self.world.pose[:count, :n])
         self.world.advance(np.concatenate([command, self._shadow_below]))
         cost = self._cost()
@@ -161,6 +163,7 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
                 for robot in (row, row + count):
                     self.world.set_conditions(robot, self.streams.motors[self._episode[row]])
         self.world.reset(both, np.concatenate([start, start]))
+        self._past.begin(both, np.concatenate([start, start]))
         self._trail[:, both] = self._landmarks()[both]
 
     def _finish(self, done: NDArray[np.bool_], infos: list[dict[str, Any]]) -> None:
@@ -192,10 +195,15 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
         count, n = self.num_envs, self.interface.n
         q, qd = self.world.pose[:, :n], self.world.qd
         learner, shadow = (
-            read_rows(self.interface, self.streams, self._episode, self._step, q[part], qd[part])
+            read_rows(self.interface, self.streams, self._episode, self._step, q[part], qd[part], self._past.rows[part])
             for part in (slice(0, count), slice(count, None))
         )
         return learner, shadow
+
+    def _base_of_both(self) -> FloatArray:
+        """Base commands of the present step, of learners and their shadows ``(2 B, n)``."""
+        base = self.streams.base[self._episode, self._step]
+        return np.concatenate([base, base])
 
     def _landmarks(self) -> FloatArray:
         n = self.interface.n

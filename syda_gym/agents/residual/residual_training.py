@@ -20,6 +20,7 @@ from syda_gym.agents.figures import Figures
 from syda_gym.agents.learned.policy import ResidualPolicy
 from syda_gym.agents.residual.checkpoint import load_checkpoint, restore_model, save_checkpoint
 from syda_gym.agents.residual.config import ResidualConfig
+from syda_gym.agents.residual.normalising import spreads
 from syda_gym.agents.stacks import build_stack, stack_arrays, stack_spec
 from syda_gym.agents.streams.ground import Ground
 from syda_gym.agents.streams.streams import Streams, score_streams
@@ -52,7 +53,7 @@ class Trained:
     Attributes:
         agent: the best policy on the validation streams; the untrained one, which is its base, takes part.
         history: one entry per leg, the untrained policy first.
-        best: index into ``history``.
+        best: index into ``history``; least by the run's own cost.
         config: hyper-parameters.
         seed: of everything.
     """
@@ -62,6 +63,12 @@ class Trained:
     best: int
     config: ResidualConfig
     seed: int
+
+    @property
+    def gained(self) -> bool:
+        """Whether the policy is better than its base on the validation streams, by the run's own cost."""
+        leg, cost = self.history[self.best], self.config.cost
+        return cost.of_figures(leg.policy) < cost.of_figures(leg.base)
 
 
 def train_residual(
@@ -239,7 +246,7 @@ class _Run:
             self.env.step(np.zeros((self.config.robots, self.env.interface.n)))
             seen.append(self.env.raw_features)
         features = np.concatenate(seen)
-        self.env.mean, self.env.std = features.mean(axis=0), np.maximum(features.std(axis=0), 1e-3)
+        self.env.mean, self.env.std = features.mean(axis=0), spreads(features, self.env.interface.n)
 
     def _new_model(self) -> Any:
         from syda_gym.agents.residual.algorithms import new_model
@@ -284,8 +291,7 @@ class _Run:
         save_checkpoint(self.model, self.folder / "checkpoint.safetensors", state, extras)
 
     def _best(self) -> int:
-        weight = self.config.cost.contact
-        return int(np.argmin([leg.policy.objective + weight * leg.policy.contact_steps for leg in self.history]))
+        return int(np.argmin([self.config.cost.of_figures(leg.policy) for leg in self.history]))
 
     def _agent(self, weights: Mapping[str, NDArray[np.float32]]) -> ResidualPolicy:
         ppo = self.config.algorithm == "ppo"
