@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from syda_gym.cli import agents, benchmark, live, motions, routes, studies
+from syda_gym.cli import agents, benchmark, live, motions, routes, studies, tune
 from syda_gym.cli.shared import console
 from syda_gym.cli.spellings import Program
 from syda_gym.errors import SydaError
@@ -54,6 +54,7 @@ app.command("reproduce-paper")(studies.reproduce_paper)
 app.command()(routes.transferability)
 app.command()(routes.route)
 app.command()(agents.train)
+app.command()(tune.tune)
 app.command()(agents.evaluate)
 app.command()(agents.play)
 app.command()(agents.export)

@@ -116,7 +116,7 @@ def test_joints_do_not_outrun_their_speed_limits(worlds, physics):
 
 
 def test_the_body_below_the_torso_stands_still(worlds):
-    world = worlds()
+    world = worlds(whole_body=True)
     rng = np.random.default_rng(0)
     commands = PEPPER.clamp(rng.uniform(PEPPER.lower, PEPPER.upper, (60, 10)))
     follow(world, commands)

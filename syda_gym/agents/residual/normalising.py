@@ -9,7 +9,7 @@ from syda_gym.embodiments.embodiment import FloatArray
 __all__ = ["LEAST_CORRECTION_SPREAD", "LEAST_SPREAD", "spreads"]
 
 LEAST_SPREAD = 0.05
-"""Smallest spread of a feature, in its own unit (m, rad, rad/s, s): what hardly moves under the base is not blown up."""
+"""Smallest spread of a feature, in its own unit (m, rad, rad/s, s), so that what hardly moves is not blown up."""
 
 LEAST_CORRECTION_SPREAD = 0.5
 """Smallest spread of the previous corrections, which lie in [-1, 1] and are all zero as long as the base acts alone."""

@@ -19,13 +19,13 @@ from syda_gym.agents.classical.rivals import make_rival
 from syda_gym.agents.figures import Figures
 from syda_gym.agents.learned.policy import ResidualPolicy
 from syda_gym.agents.residual.checkpoint import load_checkpoint, restore_model, save_checkpoint
-from syda_gym.agents.residual.config import ResidualConfig
+from syda_gym.agents.residual.config import STACK, ResidualConfig
 from syda_gym.agents.residual.normalising import spreads
 from syda_gym.agents.stacks import build_stack, stack_arrays, stack_spec
 from syda_gym.agents.streams.ground import Ground
 from syda_gym.agents.streams.streams import Streams, score_streams
 from syda_gym.envs.task.options import TeleopOptions
-from syda_gym.errors import StorageError
+from syda_gym.errors import OptionError, StorageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -83,6 +83,8 @@ def train_residual(
 ) -> Trained:
     """Trains a residual policy on an environment's motions, mapping and disturbances, in the servo model.
 
+    Every fifth action is kept for validation where there are at least two (``Ground.parts``).
+
     Args:
         options: of the environment, or a ``Ground`` made of them. Keep test motions out with ``clips`` or ``actions``.
         config: hyper-parameters; those of ``ResidualConfig()`` by default.
@@ -99,9 +101,14 @@ def train_residual(
     """
     ground = options if isinstance(options, Ground) else Ground(options)
     settings = config or ResidualConfig()
+    if base is None and settings.base == STACK:
+        raise OptionError(
+            f"this configuration stands on {STACK!r}, whose predictor is trained first; use "
+            "syda_gym.agents.training.train_stack, or name a base"
+        )
     below = base or make_rival(settings.base, ground.interface, **settings.base_settings)
-    train = ground.record(settings.episodes, seed=2 * seed)
-    validation = ground.record(settings.validation_episodes, seed=2 * seed + 1)
+    train = ground.record_part("train", settings.episodes, seed=2 * seed)
+    validation = ground.record_part("validation", settings.validation_episodes, seed=2 * seed + 1)
     return train_on_streams(
         below, train, validation, ground.rates, settings, seed=seed, folder=folder, resume=resume, progress=progress
     )

@@ -48,6 +48,25 @@ class Ground:
         """Number of clips."""
         return len(self.repertoire.clips)
 
+    def parts(self) -> dict[str, list[int]]:
+        """Clips to train on and clips to choose by, of different actions: every fifth action is for ``validation``.
+
+        Where there is only one action, both are all clips.
+        """
+        actions = sorted({clip.action for clip in self.repertoire.clips})
+        kept = set(actions[2::5] or actions[-1:]) if len(actions) > 1 else set()
+        numbered = list(enumerate(clip.action for clip in self.repertoire.clips))
+        return {
+            "train": [index for index, action in numbered if action not in kept],
+            "validation": [index for index, action in numbered if action in kept or not kept],
+        }
+
+    def record_part(self, part: str, episodes: int, *, seed: int) -> Streams:
+        """Episodes of one of the ``parts``, spread over all of its clips."""
+        clips = self.parts()[part]
+        spread = np.linspace(0, len(clips) - 1, min(episodes, len(clips))).round().astype(int)
+        return self.record(episodes, clips=[clips[index] for index in spread], seed=seed)
+
     def record(
         self,
         episodes: int | None = None,

@@ -113,7 +113,7 @@ def test_no_correction_earns_exactly_nothing_and_a_shadow_of_the_reference_earns
 
 
 def test_no_feature_saturates_once_the_policy_corrects(ground):
-    """Measured under the base alone, the spread of the corrections is 0; a tenth of a correction then was off the scale."""
+    """Under the base alone the spread of the corrections is 0; a tenth of one used to be off the scale."""
     trained = train_residual(ground, ResidualConfig.of({**TINY.as_dict(), "legs": 1, "steps": 256}), seed=0)
     n = ground.interface.n
     std, mean = trained.agent.std, trained.agent.mean
