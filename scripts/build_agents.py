@@ -4,10 +4,11 @@
     python scripts/build_agents.py --study study
     python scripts/build_agents.py --shipped           # chooses anew among what is shipped, without a study
 
-Candidates are the tuned rivals and the agents trained on the cell or on the full suite. Which one is best is decided in the
-servo model on the validation motions and on the motions that come with the package, for each route anew: the least mean of
-J over J of the base on both. The test motions have no say. Agents read the base command whatever route it came by, so that
-those trained on adult > pepper also stand for election on adult > kid > pepper.
+Candidates are the tuned rivals and the agents trained on the cell or on the full suite. Which one is best is decided in
+the servo model on the validation motions and on the motions that come with the package, for each route anew: no
+worse than the base on either, and then the least mean of J over J of the base. The test motions have no say. Agents read
+the base command whatever route it came by, so that those trained on adult > pepper also stand for election on
+adult > kid > pepper.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ def choose(
         name: {part: score_streams(agent, streams, study.rates) for part, streams in judged.items()}
         for name, agent in agents.items()
     }
-    best = min(scores, key=lambda name: share(scores[name], scores["base"]))
+    best = min(scores, key=lambda name: rank(scores[name], scores["base"]))
     target = out / f"{'-'.join(study.route)}-{study.folder(cell).name}"
     save_agent(
         agents[best],
@@ -96,9 +97,10 @@ def embedded(study: Study, cell: str) -> Streams:
     return ground.record(study.size.validation_episodes, seed=8)
 
 
-def share(mine: Mapping[str, Figures], base: Mapping[str, Figures]) -> float:
-    """Mean of J over that of the base."""
-    return sum(mine[part].objective / base[part].objective for part in base) / len(base)
+def rank(mine: Mapping[str, Figures], base: Mapping[str, Figures]) -> tuple[bool, float]:
+    """Whether an agent is worse than the base on any of the motions, and the mean of J over that of the base."""
+    shares = [mine[part].objective / base[part].objective for part in base]
+    return max(shares) > 1.0, sum(shares) / len(shares)
 
 
 def write_settings(study: Study, out: Path) -> None:

@@ -178,7 +178,7 @@ def _residual_bars(cells: Mapping[tuple[str, str], Cell]) -> list[str]:
 
 
 def _stack_bars(cells: Mapping[tuple[str, str], Cell]) -> list[str]:
-    """The default stack, a policy on the predictor, against the predictor alone; then who is the best row of each cell."""
+    """The default stack, a policy on the predictor, against the predictor; then who is the best row of each cell."""
     rows = []
     for (name, level), cell in cells.items():
         if "stack" not in cell.runs:

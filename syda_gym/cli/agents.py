@@ -52,8 +52,8 @@ def train(
     base: Annotated[
         str,
         typer.Option(
-            help="What it stands on. Default: what the configuration names, as a rule `stack`: a predictor, trained first, "
-            f"on the Kalman filter tuned for the disturbances. {AGENT_HELP}",
+            help="What it stands on. Default: what the configuration names, as a rule `stack`: a predictor, trained "
+            f"first, on the Kalman filter tuned for the disturbances. {AGENT_HELP}",
             metavar="AGENT",
             callback=checks.agents_or(STACK),
         ),

@@ -46,8 +46,8 @@ class Scene:
     reference: Annotated[
         str,
         typer.Option(
-            help="What errors are measured against: `mapped`, what the mapping makes of the undisturbed operator, which "
-            "an agent can reach, or `paired`, the robot's own recorded motion, which includes the mapping's error.",
+            help="What errors are measured against: `mapped`, what the mapping makes of the undisturbed operator, "
+            "which an agent can reach, or `paired`, the robot's recorded motion, which includes the mapping's error.",
             callback=checks.one_of(REFERENCES, "reference"),
         ),
     ] = "mapped"
