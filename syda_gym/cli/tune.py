@@ -29,7 +29,9 @@ def tune(
     out: Annotated[
         Path, typer.Option("--out", "-o", help="Folder of the tuned agents, a bundle each.", callback=checks.folder)
     ] = Path("tuned"),
-    episodes: Annotated[int, typer.Option(help="Episodes to tune on, spread over the clips.", min=1)] = 36,
+    count: Annotated[
+        int, typer.Option("--training-episodes", help="Episodes to tune on, spread over the clips.", min=1)
+    ] = 36,
     budget: Annotated[int, typer.Option(help="Settings to try for each.", min=1)] = 32,
     seed: SeedOption = 0,
     as_json: JsonOption = False,
@@ -44,7 +46,7 @@ def tune(
     chosen = names or [name for name in RIVALS if name not in CONTACT_RIVALS]
     options = scene.options(training=True)
     with bar("Tuning") as tell:
-        found = tune_rivals(options, chosen, episodes=episodes, budget=budget, seed=seed, out=out, progress=tell)
+        found = tune_rivals(options, chosen, episodes=count, budget=budget, seed=seed, out=out, progress=tell)
     if as_json:
         print_json(
             {

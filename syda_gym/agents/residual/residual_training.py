@@ -169,7 +169,6 @@ class _Run:
         self.config, self.seed, self.folder = config, seed, folder
         self.env: ResidualVecEnv = ResidualVecEnv(
             _copy(base),
-            _copy(base),
             train,
             rates,
             count=config.robots,
