@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from syda_gym.cli import agents, benchmark, live, motions, routes, studies, tune
+from syda_gym.cli import benchmark, live, motions, routes, studies
+from syda_gym.cli.acting import agents, tune
 from syda_gym.cli.shared import console
 from syda_gym.cli.spellings import Program
 from syda_gym.errors import SydaError

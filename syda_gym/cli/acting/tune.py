@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from syda_gym.cli import checks
+from syda_gym.cli.acting.scene import Scene, with_scene
 from syda_gym.cli.names import RIVALS, ticked
 from syda_gym.cli.options import JsonOption, SeedOption
-from syda_gym.cli.scene import Scene, with_scene
 from syda_gym.cli.shared import bar, print_json, say_written, show_table
 
 __all__ = ["tune"]

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from syda_gym.cli import checks
-from syda_gym.cli.figures import print_figures
+from syda_gym.cli.acting.figures import print_figures
+from syda_gym.cli.acting.scene import Scene, with_scene
 from syda_gym.cli.names import ALGORITHMS, CONFIGS, KINDS, PHYSICS, STACK, ticked
 from syda_gym.cli.options import AGENT_HELP, JsonOption, PhysicsHzOption, SeedOption
-from syda_gym.cli.scene import Scene, with_scene
 from syda_gym.cli.shared import bar, console, print_json, say_written
 
 if TYPE_CHECKING:
