@@ -5,9 +5,9 @@
     python scripts/build_agents.py --shipped           # chooses anew among what is shipped, without a study
 
 Candidates are the tuned rivals and the agents trained on the cell or on the full suite. Which one is best is decided in
-the servo model on the validation motions and on the motions that come with the package, for each route anew: no
-worse than the base on either, and then the least mean of J over J of the base. The test motions have no say. Agents read
-the base command whatever route it came by, so that those trained on adult > pepper also stand for election on
+the servo model on the validation motions and on the motions that come with the package, for each route anew: no worse
+than the base on either, and then the least mean of J over J of the base. The test motions have no say. Agents read the
+base command whatever route it came by, so that those trained on adult > pepper also stand for election on
 adult > kid > pepper.
 """
 

@@ -1,7 +1,8 @@
-"""Builds ``syda_gym/assets/transferability.json``: the sampled comparisons of the bodies of the embedded motions.
+"""Builds what is known beforehand of the bundled bodies: sampled workspaces compared, and the default plan imitated.
 
-``python scripts/build_transferability.py`` writes the asset (about a minute); with ``--check`` it samples again and
-says whether the asset still holds. Run it when a bundled body or the sampling has changed.
+``python scripts/build_transferability.py`` writes ``assets/transferability.json`` and ``assets/dry_run.npz`` (about a
+minute); with ``--check`` it computes again and says whether the assets still hold. Run it when a bundled body, the
+sampling, the embedded motions or the imitation has changed.
 """
 
 from __future__ import annotations
@@ -12,8 +13,11 @@ import itertools
 import numpy as np
 
 from syda_gym.embodiments import catalog
-from syda_gym.files import read_json, write_json
+from syda_gym.files import atomic_path, read_json, write_json
 from syda_gym.motions.synthetic.generator import BODIES
+from syda_gym.routes.dry_run import memory
+from syda_gym.routes.dry_run.imitation import imitate
+from syda_gym.routes.dry_run.memory import default_plan, imitation_key
 from syda_gym.routes.general import Sampling
 from syda_gym.routes.metric import compare_arms, pair_arms
 from syda_gym.routes.shipped import FILE, Rows, comparison_key
@@ -35,17 +39,32 @@ def comparisons() -> dict[str, Rows]:
     return found
 
 
+def imitations() -> dict[str, np.ndarray]:
+    """Directions that the bundled robots reach in every clip of the default plan, by the key of body and clip."""
+    plan, found = default_plan(), {}
+    for body in map(catalog.get, BODIES):
+        if body.kind == "robot":
+            for clip, shown in zip(plan.clips, imitate(body, plan), strict=True):
+                found |= {f"{imitation_key(body, clip)}/{side}": arm for side, arm in shown.items()}
+    return found
+
+
 def main() -> int:
     """Command line; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="compare instead of writing")
-    check, made = parser.parse_args().check, comparisons()
+    check, made, shown = parser.parse_args().check, comparisons(), imitations()
     if not check:
         write_json(FILE, {"comparisons": made})
+        with atomic_path(memory.FILE) as path, path.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **shown)
         print(f"{FILE}: {len(made)} comparisons, {FILE.stat().st_size} bytes")
+        print(f"{memory.FILE}: {len(shown)} imitations, {memory.FILE.stat().st_size} bytes")
         return 0
     stored = read_json(FILE)["comparisons"]
     same = stored.keys() == made.keys() and all(np.allclose(made[key], stored[key], atol=TOLERANCE) for key in made)
+    with np.load(memory.FILE, allow_pickle=False) as known:
+        same &= set(known.files) == set(shown) and all(np.allclose(known[key], shown[key], atol=1e-6) for key in shown)
     print("holds" if same else "differs: run scripts/build_transferability.py and commit the asset")
     return 0 if same else 1
 

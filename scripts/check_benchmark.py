@@ -28,8 +28,8 @@ from typing import Any
 from unittest import mock
 
 from syda_gym.evaluation.benchmark import BenchmarkConfig, Results, read_results, run_benchmark
-from syda_gym.evaluation.benchmark import pools as pool_module
 from syda_gym.evaluation.benchmark.compare import compare
+from syda_gym.evaluation.pools import InlinePool
 from syda_gym.files import read_json, write_json
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
@@ -53,30 +53,6 @@ KILLED = {
 }
 KILLED_ACTIONS = 6
 KILLS = 20
-
-
-class Here(pool_module.Pool):
-    """Computes in this process, so that one clock sees everything."""
-
-    size = 1
-
-    def __init__(self, motions: Any) -> None:
-        pool_module._open(motions)
-
-    def submit(self, worker: int, cell: Any) -> Any:
-        """Keeps the cell for later."""
-        return cell
-
-    def wait(self, tickets: Sequence[Any]) -> Any:
-        """The only one."""
-        return tickets[0]
-
-    def outcome(self, ticket: Any, cell: Any) -> dict[str, Any]:
-        """Computes now."""
-        return pool_module._compute(cell.to_dict())
-
-    def close(self) -> None:
-        """Nothing to release."""
 
 
 class Clock:
@@ -109,13 +85,14 @@ def overhead(motions_name: str) -> dict[str, Any]:
     """Shares of one benchmark's processor time: fits, episodes, and what the harness adds."""
     from syda_gym.agents.classical.rivals import BaseAlone
     from syda_gym.envs.teleop import SydaTeleopEnv
-    from syda_gym.evaluation.benchmark import runner, work
+    from syda_gym.evaluation import cell_files
+    from syda_gym.evaluation.benchmark import execution, work
     from syda_gym.evaluation.chains import Links
 
     motions = _few(load_motions(motions_name, OVERHEAD["fps"]), ACTIONS)
     clock = Clock()
     with ExitStack() as stack:
-        stack.enter_context(mock.patch.object(runner, "make_pool", lambda workers, data: Here(data)))
+        stack.enter_context(mock.patch.object(execution, "make_pool", lambda workers, *work: InlinePool(*work)))
         with tempfile.TemporaryDirectory() as folder:  # imports and caches, which belong to no episode
             run_benchmark(BenchmarkConfig.of({**OVERHEAD, "folds": "loao"}), folder, motions=_few(motions, 2))
         for owner, function, name in (
@@ -127,9 +104,9 @@ def overhead(motions_name: str) -> dict[str, Any]:
             (BaseAlone, "act", "agent"),
             (work, "figures_of_all", "figures"),
             (work, "latency", "latency of one frame"),
-            (runner, "_store", "storing cells"),
-            (runner, "_collect", "collecting"),
-            (runner, "write_results", "writing results"),
+            (cell_files.CellFiles, "write", "storing cells"),
+            (execution, "_collected", "collecting"),
+            (execution, "write_results", "writing results"),
         ):
             stack.enter_context(clock.watch(owner, function, name))
         with tempfile.TemporaryDirectory() as folder:
@@ -222,7 +199,7 @@ def _finish(config: Path, folder: Path, workers: int) -> None:
 
 def _bytes(folder: Path) -> dict[str, Any]:
     """Everything that must not differ: the results, their provenance, and the rows of every cell."""
-    cells = {path.name: read_json(path)["rows"] for path in sorted((folder / "cells").glob("*.json"))}
+    cells = {path.name: read_json(path)["content"]["rows"] for path in sorted((folder / "cells").glob("*.json"))}
     files = {name: (folder / name).read_bytes() for name in ("results.csv", "benchmark.json")}
     return {**files, "cells": cells, "leftovers": [path.name for path in (folder / "cells").glob(".*")]}
 

@@ -3,11 +3,12 @@
     python scripts/fuzz.py [--inputs 5000] [--seeds 20] [--first 0] [--only NAME] [--out docs/results/fuzz.json]
 
 Every reader of motions, stored mappings, agents and checkpoints, robot descriptions and URDFs, benchmark settings,
-journals and network packets gets valid samples that were damaged as bytes (cut, overwritten, repeated, mixed) or inside
-their container (a JSON value replaced, a member of an archive changed, a header of weights falsified). A reader may
-take what it gets or raise a ``SydaError``; anything else is a finding, as is an input that takes longer than the limit.
-An input follows from its seed and number alone. After each seed the results are written, and a seed that they hold
-already is not run again; findings are kept beside them.
+journals and network packets gets files built to hurt (circles, aliases that multiply, deep chains, sizes that disagree,
+archives that unpack to gigabytes; see ``fuzz_build``) and valid samples that were damaged as bytes (cut, overwritten,
+repeated, mixed) or inside their container (a JSON value replaced, a member of an archive changed, a header of weights
+falsified). A reader may take what it gets or raise a ``SydaError``; anything else is a finding, as is an input that
+takes longer or more memory than the limit. An input follows from its seed and number alone. After each seed the
+results are written, and a seed that they hold already is not run again; findings are kept beside them.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ from syda_gym.files import read_json, write_json
 
 ROOT = Path(__file__).resolve().parents[1]
 LIMIT = 5.0  # s of processor time for one input
+MEMORY = 1 << 30  # bytes beyond what is in use before the first input
+BUILT = 0.2  # share of inputs that are built instead of damaged
 Tally = dict[str, dict[str, int]]
 
 
@@ -40,6 +43,7 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=20, help="number of seeds")
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--only", default="", help="a part of the targets' names")
+    parser.add_argument("--each", type=int, default=0, help="only this many inputs of every builder, and no damage")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "results" / "fuzz.json")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
@@ -50,6 +54,11 @@ def main() -> int:
         result = read_json(options.out)
     with tempfile.TemporaryDirectory() as folder:
         targets = [target for target in all_targets(Path(folder)) if options.only in target.name]
+        limit_memory()
+        if options.each:
+            found = each_builder(targets, options.each)
+            write_json(options.out, found)
+            return 1 if any(entry["findings"] for entry in found.values()) else 0
         for seed in range(options.first, options.first + options.seeds):
             if seed in result["seeds"]:
                 continue
@@ -58,6 +67,32 @@ def main() -> int:
             write_json(options.out, result)
     print(f"{result['inputs']} inputs, {len(result['findings'])} findings: {options.out}")
     return 1 if result["findings"] else 0
+
+
+def each_builder(targets: list[Target], count: int) -> dict[str, dict[str, Any]]:
+    """Every builder's first inputs: target and builder to the inputs, those that were read, and the findings."""
+    result = {}
+    for target in targets:
+        for build in target.build:
+            outcomes = [attempt(target, build(target.samples, np.random.default_rng([1, k]))) for k in range(count)]
+            result[f"{target.name} {build.__name__}"] = {
+                "inputs": count,
+                "read": outcomes.count("read"),
+                "findings": sorted(set(outcomes) - {"read", "refused"}),
+            }
+    return result
+
+
+def limit_memory() -> None:
+    """No input may take more than ``MEMORY`` beyond what this process has now."""
+    try:
+        import resource
+    except ImportError:  # there is none outside of Unix
+        return
+    pages = int(Path("/proc/self/statm").read_text().split()[0]) if Path("/proc/self/statm").is_file() else 0
+    if pages:
+        limit = pages * os.sysconf("SC_PAGE_SIZE") + MEMORY
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
 
 def run(targets: list[Target], inputs: int, seed: int, folder: Path) -> tuple[Tally, list[dict[str, Any]]]:
@@ -72,7 +107,10 @@ def run(targets: list[Target], inputs: int, seed: int, folder: Path) -> tuple[Ta
     findings: list[dict[str, Any]] = []
     for number in range(inputs):
         target = min(targets, key=lambda one: tally[one.name]["inputs"] / one.share)
-        data = target.damage(target.samples, np.random.default_rng([seed, number]))
+        rng = np.random.default_rng([seed, number])
+        built = target.build and rng.random() < BUILT
+        make = target.build[int(rng.integers(len(target.build)))] if built else target.damage
+        data = make(target.samples, rng)
         outcome = attempt(target, data)
         tally[target.name]["inputs"] += 1
         tally[target.name]["read"] += outcome == "read"

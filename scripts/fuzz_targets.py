@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fuzz_build import BUILDERS, Builder
 from fuzz_damage import Damage, in_archive, in_bytes, in_json, in_json_lines, in_weights, in_yaml, mixed
 
 import syda_gym
@@ -25,6 +26,7 @@ from syda_gym.evaluation.benchmark.config import BenchmarkConfig
 from syda_gym.files import asset, fingerprint, read_json, write_json
 from syda_gym.motions.dataset import write_dataset
 from syda_gym.motions.loading import FORMATS
+from syda_gym.motions.readers.said import told
 from syda_gym.teleoperation import TeleoperationLoop
 from syda_gym.teleoperation.incoming.packets import PacketDecoder, encode_frame, encode_request
 from syda_gym.teleoperation.journal import Journal, replay_journal
@@ -46,6 +48,7 @@ class Target:
         read: how it is called.
         damage: how its samples are damaged.
         share: how many inputs it gets, relative to the others; quick readers more.
+        build: what is built for it besides damage.
     """
 
     name: str
@@ -53,11 +56,12 @@ class Target:
     read: Callable[[bytes], Any]
     damage: Damage = in_bytes
     share: float = 1.0
+    build: tuple[Builder, ...] = ()
 
 
 def all_targets(folder: Path) -> list[Target]:
-    """Every target, with its samples written into ``folder``."""
-    return [
+    """Every target, with its samples written into ``folder``, and what is built for it besides damage."""
+    targets = [
         *motion_targets(folder),
         *mapping_targets(folder),
         *agent_targets(folder),
@@ -65,6 +69,7 @@ def all_targets(folder: Path) -> list[Target]:
         *live_targets(folder),
         benchmark_target(folder),
     ]
+    return [replace(target, build=BUILDERS.get(target.name, ())) for target in targets]
 
 
 def motion_targets(folder: Path) -> list[Target]:
@@ -94,9 +99,55 @@ def motion_targets(folder: Path) -> list[Target]:
         file_target("openni", [openni, text("cornell.txt", "\n".join(recordings.cornell_lines(6)))]),
         file_target("bvh", [text("walk.bvh", recordings.bvh_text())]),
         file_target("mediapipe", [text("pose.json", recordings.json_text(pose))], mixed(in_json)),
+        file_target("keypoints", [points_file(folder)], mixed(in_archive)),
+        file_target("table", [*case_files("*.csv"), *case_files("*.txt"), *case_files("*.skeleton")]),
+        file_target("azure", case_files("azure*.json"), mixed(in_json)),
+        layout_target(folder),
+        *capture_targets(folder),
         paper_target(folder),
         *pairs_targets(folder, few),
     ]
+
+
+def case_files(pattern: str) -> list[Path]:
+    """The small case files of the tests."""
+    return sorted((Path(__file__).resolve().parents[1] / "tests" / "motions" / "readers" / "cases").glob(pattern))
+
+
+def points_file(folder: Path) -> Path:
+    """Landmarks as an archive of arrays."""
+    np.savez(folder / "points.npz", pose=recordings.mediapipe_table(6), fps=np.array(25.0))
+    return folder / "points.npz"
+
+
+def layout_target(folder: Path) -> Target:
+    """The YAML in which somebody describes a format of their own."""
+    place = folder / "layout.yaml"
+    text = b"order: [LShoulder, LElbow, LHand, RShoulder, RElbow, RHand]\nunit: mm\nup: z\nfps: 50\njoints: {Head: 3}\n"
+    place.write_bytes(text)
+    return Target("motions-layout", [text], replacing(place, lambda: told(layout=place)), mixed(in_yaml), share=0.3)
+
+
+def capture_targets(folder: Path) -> list[Target]:
+    """C3D, which is opened in a process of its own and so gets few inputs; none without the library."""
+    try:
+        import ezc3d
+    except ImportError:
+        return []
+    place = folder / "small.c3d"
+    file = ezc3d.c3d()
+    point = file["parameters"]["POINT"]
+    names = ["LSHO", "LELB", "LWRA", "LWRB", "RSHO", "RELB", "RWRA", "RWRB"]
+    point["RATE"]["value"], point["LABELS"]["value"], point["UNITS"]["value"] = [100.0], names, ["mm"]
+    file["data"]["points"] = np.random.default_rng(0).normal(size=(4, len(names), 12)) * 300.0
+    file.write(str(place))
+    damaged = folder / "damaged.c3d"
+
+    def read(data: bytes) -> Any:
+        damaged.write_bytes(data)
+        return FORMATS["c3d"].read(damaged)
+
+    return [Target("motions-c3d", [place.read_bytes()], read, share=0.01)]
 
 
 def few_motions() -> syda_gym.Motions:
@@ -188,7 +239,27 @@ def agent_targets(folder: Path) -> list[Target]:
         Target("agent-card", [card.read_bytes()], replacing(card, read), mixed(in_json)),
         Target("agent-weights", [weights.read_bytes()], replacing(weights, read), mixed(in_weights)),
         Target("agent-checkpoint", [checkpoint_bytes()], read_checkpoint, mixed(in_weights)),
+        *onnx_targets(folder),
     ]
+
+
+def onnx_targets(folder: Path) -> list[Target]:
+    """An exported graph; none without the libraries."""
+    try:
+        import onnx  # noqa: F401
+        import onnxruntime  # noqa: F401
+    except ImportError:
+        return []
+    from syda_gym.agents.deployment.onnx_runners import OnnxAgent
+
+    place = folder / "agent.onnx"
+
+    def read(data: bytes) -> Any:
+        place.write_bytes(data)
+        return OnnxAgent(place)
+
+    sample = BUILDERS["agent-onnx"][0]([], np.random.default_rng(0))
+    return [Target("agent-onnx", [sample], read, share=0.2)]
 
 
 def checkpoint_bytes() -> bytes:

@@ -36,7 +36,6 @@ repository says what we guard against ourselves.
 STATED_ELSEWHERE = {
     "cmeel-qhull": "Qhull",
     "embreex": "BSD-2-Clause",
-    "upc-pymotion": "MIT",
     "vhacdx": "MIT",
 }
 SHORT = {

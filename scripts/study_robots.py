@@ -21,6 +21,7 @@ from syda_gym.embodiments import catalog
 from syda_gym.embodiments.discovery.arms import discover
 from syda_gym.embodiments.discovery.example_robots import example_urdfs
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.kinematics.arm_chain import ArmChain
 from syda_gym.embodiments.kinematics.urdf import placements_at, read_urdf
 from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.embodiments.reading.source import ROBOT_ENDINGS
@@ -42,22 +43,23 @@ WAVE, FPS, POSES, STARTS = "wave_side", 30.0, 48, 6
 HEADER = """# Robots of other makers
 
 What `syda-gym robot add` makes, without any hint, of the robots in the PyPI package
-[`example-robot-data`](https://pypi.org/project/example-robot-data/) {version} (`pip install 'syda-gym[robots]'`): {two} of its
-{all} URDFs have two arms. The others are quadrupeds, drones, single arms and hands, and files without joints. Below them the made-up
-robots of the tests (`tests/embodiments/discovery/cases`), each one kind of trap. Written by
+[`example-robot-data`](https://pypi.org/project/example-robot-data/) {version} (`pip install 'syda-gym[robots]'`):
+{two} of its {all} URDFs have two arms. The others are quadrupeds, drones, single arms and hands, and files without
+joints. Below them the made-up robots of the tests (`tests/embodiments/discovery/cases`), each one kind of trap.
 
 ```console
 python scripts/study_robots.py tests/embodiments/discovery/cases --table docs/robots-found.md
 ```
 
-- **off axis**: the farther of elbow and wrist from the axis that bends there [mm]; 0 is right. *tip*: the file ends before the wrist, which is
-  the end of the forearm's shape.
-- **points**: mean angle between a person's limbs and the robot's over {poses} poses of the embedded adult, **best** the least that its joints
-  allow (the best of {starts} searches with all joints free), in degrees.
-- **sequence**: the same over the action `{wave}` at 30 frames a second, keeping to the joints' speeds, behind it the best of frame by frame.
-- **still, wave**: how far PyBullet's landmarks are from the kinematics', standing for three seconds (at most), and over that action from
-  where the motors should be (on average, lag of the motors included) [mm]. *weak*: gravity alone asks more of a motor than the effort that the
-  file states.
+- **off axis**: the farther of elbow and wrist from the axis that bends there [mm]; 0 is right. *tip*: a wrist that no
+  joint bends, such as the end of the forearm's shape.
+- **points**: mean angle between a person's limbs and the robot's over {poses} poses of the embedded adult, **best** the
+  least that its joints allow (the best of {starts} searches with all joints free), in degrees.
+- **sequence**: the same over the action `{wave}` at 30 frames a second, keeping to the joints' speeds; behind it the
+  best of frame by frame.
+- **still, wave**: how far PyBullet's landmarks are from the kinematics': the largest after standing for three seconds,
+  and the mean over that action, lag of the motors included [mm]. *weak*: gravity alone asks more of a motor than the
+  effort that the file states.
 - **broken**: commands beyond a limit or a speed.
 - **add**: processor time of finding, judging and drawing [s].
 
@@ -104,33 +106,48 @@ def angles_between(robot: Robot, frames: FloatArray, wanted: FloatArray) -> Floa
 
 
 def best_angles(robot: Robot, wanted: FloatArray, starts: int = STARTS) -> FloatArray:
-    """Least mean angle of each pose and arm that all joints within their limits can reach, ``(N, arms)`` [degrees]."""
-    from scipy.optimize import least_squares
+    """Least mean angle of each pose and arm that all joints within their limits can reach, ``(N, arms)`` [degrees].
 
+    Projected Levenberg-Marquardt steps on the limbs' directions over all joints, from the solver's answer and from
+    random poses, all at once.
+    """
     rng = np.random.default_rng(0)
     found = np.zeros(wanted.shape[:2])
     solved = LimbIK.of(robot).solve(wanted)
+    goals = wanted / np.linalg.norm(wanted, axis=-1, keepdims=True)
     for arm, (chain, part) in enumerate(zip(robot.chains, robot.arm_slices, strict=True)):
-        low, high = chain.lower, chain.upper
-        for row, limbs in enumerate(wanted[:, arm]):
-            goal = limbs / np.linalg.norm(limbs, axis=-1, keepdims=True)
-
-            def residual(q: FloatArray, goal: FloatArray = goal, chain=chain) -> FloatArray:  # type: ignore[no-untyped-def]
-                points = chain.points(q[None])[0, :3]
-                reached = np.diff(points, axis=0)
-                return (reached / np.linalg.norm(reached, axis=-1, keepdims=True) - goal).ravel()
-
-            least = np.inf
-            guesses = [np.clip(solved[row, part], low, high), *rng.uniform(low, high, (starts - 1, len(low)))]
-            for guess in guesses:
-                inside = np.clip(guess, low + 1e-6, high - 1e-6)
-                result = least_squares(residual, inside, bounds=(low, high), max_nfev=60)
-                chords = np.linalg.norm(residual(result.x).reshape(2, 3), axis=1)
-                least = min(least, float(np.degrees(2.0 * np.arcsin(np.clip(chords / 2.0, 0.0, 1.0))).mean()))
-                if least < 0.05:
-                    break
-            found[row, arm] = least
+        shape = (starts - 1, len(wanted), chain.n_joints)
+        guesses = np.concatenate([solved[None, :, part], rng.uniform(chain.lower, chain.upper, shape)])
+        q = np.clip(guesses.reshape(-1, chain.n_joints), chain.lower, chain.upper)
+        goal = np.tile(goals[:, arm].reshape(len(wanted), 6), (starts, 1))
+        residual, jacobian = _directions(chain, q, goal)
+        damping = np.full(len(q), 1e-2)
+        for _ in range(60):
+            gradient = np.einsum("nij,ni->nj", jacobian, residual)
+            stuck = ((q <= chain.lower) & (gradient > 0)) | ((q >= chain.upper) & (gradient < 0))
+            free = np.where(stuck[:, None], 0.0, jacobian)
+            normal = np.einsum("nij,nik->njk", free, free) + damping[:, None, None] * np.eye(q.shape[1])
+            step = np.linalg.solve(normal, -np.where(stuck, 0.0, gradient)[..., None])[..., 0]
+            trial = np.clip(q + step, chain.lower, chain.upper)
+            new, slope = _directions(chain, trial, goal)
+            better = (new**2).sum(axis=1) < (residual**2).sum(axis=1)
+            q, residual = np.where(better[:, None], trial, q), np.where(better[:, None], new, residual)
+            jacobian = np.where(better[:, None, None], slope, jacobian)
+            damping = np.clip(np.where(better, 0.3, 4.0) * damping, 1e-7, 1e3)
+        chords = np.linalg.norm(residual.reshape(starts, len(wanted), 2, 3), axis=-1)
+        angles = np.degrees(2.0 * np.arcsin(np.clip(chords / 2.0, 0.0, 1.0))).mean(axis=-1)
+        found[:, arm] = angles.min(axis=0)
     return found
+
+
+def _directions(chain: ArmChain, q: FloatArray, goal: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Unit limb directions minus the wanted ones ``(N, 6)``, and their derivatives ``(N, 6, n)``."""
+    points, jacobians = chain.jacobians(q)
+    limbs, slopes = np.diff(points[:, :3], axis=1), np.diff(jacobians[:, :3], axis=1)
+    lengths = np.linalg.norm(limbs, axis=-1, keepdims=True)
+    unit = limbs / lengths
+    across = (slopes - unit[..., None] * np.einsum("nli,nlij->nlj", unit, slopes)[:, :, None]) / lengths[..., None]
+    return unit.reshape(len(q), 6) - goal, across.reshape(len(q), 6, -1)
 
 
 def poses(robot: Robot, frames: FloatArray) -> FloatArray:
@@ -162,7 +179,7 @@ def study(name: str, path: Path, folder: Path | None) -> Finding:
     """Everything about one file."""
     start = time.process_time()
     try:
-        description, notices = describe_robot(path, name)
+        description, _ = describe_robot(path, name)
         robot = Robot(description)
         verdict = judge_robot(robot)
         picture = (folder or Path(tempfile.gettempdir())) / f"{name}.png"
@@ -176,7 +193,7 @@ def study(name: str, path: Path, folder: Path | None) -> Finding:
         wave = next(t for t in motions.takes if t.action == WAVE and "adult" in t.frames).frames["adult"]
         mapped = robot.clamp(geometric_mapping(catalog.get("adult"), robot)(wave))
         sequence = limit_speed(robot, mapped, FPS)
-        every = max(1, len(wave) // 24)
+        every = max(1, len(wave) // 16)
         sequence_error = angles_between(robot, sequence, poses(robot, wave)).mean()
         sequence_best = best_angles(robot, poses(robot, wave)[::every], 3).mean()
         speeds = np.abs(np.diff(sequence, axis=0)) * FPS
@@ -189,8 +206,8 @@ def study(name: str, path: Path, folder: Path | None) -> Finding:
     arm = robot.description.arms[0]
     row = (
         f"| {name} | {len(arm.joints)} | `{arm.elbow}`, `{arm.wrist}` | {1000 * worst:.1f}{' tip' if ends else ''} | "
-        f"{points:.1f} ({best:.1f}) | {sequence_error:.1f} ({sequence_best:.1f}) | {1000 * still:.1f}, {1000 * waving:.0f}{weak} | "
-        f"{broken} | {added:.1f} |\n"
+        f"{points:.1f} ({best:.1f}) | {sequence_error:.1f} ({sequence_best:.1f}) | "
+        f"{1000 * still:.1f}, {1000 * waving:.0f}{weak} | {broken} | {added:.1f} |\n"
     )
     return Finding(name, row)
 

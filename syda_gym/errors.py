@@ -16,6 +16,7 @@ __all__ = [
     "StorageError",
     "SydaError",
     "TeleoperationError",
+    "UnknownOptionError",
     "nearest_name",
 ]
 
@@ -42,6 +43,10 @@ class RouteError(SydaError, ValueError):
 
 class OptionError(SydaError, ValueError):
     """An option has a value outside what is allowed; the message lists what is allowed."""
+
+
+class UnknownOptionError(OptionError, TypeError):
+    """No option has that name; a ``TypeError`` in Python's own wording as well, which other libraries look for."""
 
 
 class StorageError(SydaError, OSError):

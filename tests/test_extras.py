@@ -22,15 +22,30 @@ FEATURES = {
         "onnx",
         "from syda_gym.agents.deployment import export; export.export_onnx(None, 'agent.onnx')",
     ),
-    "bvh": (
-        "pymotion",
-        "from motions.recordings import bvh_text; from pathlib import Path; Path('a.bvh').write_text(bvh_text());"
-        "import syda_gym; syda_gym.load_motions('bvh:a.bvh')",
+    "c3d": (
+        "ezc3d",
+        "from pathlib import Path; Path('a.c3d').write_bytes(b'xP' * 500); import syda_gym; "
+        "syda_gym.load_motions('a.c3d')",
+    ),
+    "ros": (
+        "rosbags",
+        "from pathlib import Path; Path('a.bag').write_bytes(b'#ROSBAG V2.0'); import syda_gym; "
+        "syda_gym.load_motions('a.bag')",
     ),
     "live": (
         "websockets",
         "import syda_gym; from syda_gym.teleoperation.incoming.sources import WebSocketSource;"
         "WebSocketSource(syda_gym.embodiment('adult')).start()",
+    ),
+    "camera": (
+        "mediapipe",
+        "from syda_gym.motions.film.pose_model import PoseModel; open('a.task', 'w').write('model');"
+        "PoseModel('a.task')",
+    ),
+    "view": (
+        "viser",
+        "from syda_gym.simulation.page.plan import PagePlan; from syda_gym.simulation.page.process import PageProcess;"
+        "PageProcess(PagePlan('title'), dict).open()",
     ),
     "naoqi": (
         "qi",

@@ -20,7 +20,7 @@ from syda_gym.agents.agent import Agent
 from syda_gym.agents.interface import Interface
 from syda_gym.agents.stacks import build_stack, stack_arrays, stack_spec
 from syda_gym.errors import AgentError, StorageError
-from syda_gym.files import atomic_path, fingerprint, read_json, write_json
+from syda_gym.files import atomic_path, check_tensors, fingerprint, read_json, shortened, write_json
 
 __all__ = ["FORMAT", "load_agent", "package_versions", "read_card", "save_agent"]
 
@@ -28,6 +28,7 @@ FORMAT = 1
 """Version of the format; others are refused."""
 
 _MAX_BYTES = 256 * 2**20
+_MOST_AGENTS = 16
 _PACKAGES = ("syda-gym", "numpy", "torch", "stable-baselines3", "gymnasium", "pybullet")
 
 
@@ -102,7 +103,9 @@ def load_agent(path: str | os.PathLike[str], where: Any) -> Agent:
     except AgentError as error:
         raise AgentError(f"{card_path}: {error}") from error
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
-        raise StorageError(f"{card_path} is damaged: {error!r}; train again or copy the bundle again") from error
+        raise StorageError(
+            f"{card_path} is damaged: {type(error).__name__}: {str(error)[:400]}; train again or copy the bundle again"
+        ) from error
 
 
 def read_card(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -115,7 +118,11 @@ def read_card(path: str | os.PathLike[str]) -> dict[str, Any]:
     card = read_json(card_path)
     if not isinstance(card, dict) or card.get("format") != FORMAT:
         found = card.get("format") if isinstance(card, dict) else None
-        raise StorageError(f"{card_path}: expected an agent bundle of format {FORMAT}, got format {found}; train again")
+        raise StorageError(
+            f"{card_path}: expected an agent bundle of format {FORMAT}, got format {shortened(found, 60)}; train again"
+        )
+    if isinstance(card.get("stack"), list) and len(card["stack"]) > _MOST_AGENTS:
+        raise StorageError(f"{card_path}: a stack of {len(card['stack'])} agents; at most {_MOST_AGENTS} are read")
     for key, kind in (("stack", list), ("interface", dict), ("weights", str)):
         if not isinstance(card.get(key), kind):
             raise StorageError(
@@ -136,8 +143,7 @@ def _read_arrays(path: Path) -> dict[str, NDArray[Any]]:
 
     if not path.is_file():
         raise StorageError(f"no file {path}; a bundle is a .safetensors and a .json side by side")
-    if path.stat().st_size > _MAX_BYTES:
-        raise StorageError(f"{path} is larger than {_MAX_BYTES >> 20} MB; that is no agent")
+    check_tensors(path, "the weights of an agent", _MAX_BYTES)
     try:
         arrays: dict[str, NDArray[Any]] = load_file(str(path))
     except (SafetensorError, ValueError, KeyError, OSError) as error:
@@ -145,6 +151,8 @@ def _read_arrays(path: Path) -> dict[str, NDArray[Any]]:
     for name, value in arrays.items():
         if not np.isfinite(value).all():
             raise StorageError(f"{path}: {name!r} holds values that are not finite; train again")
+        if name.endswith(".std") and not (value > 0.0).all():
+            raise StorageError(f"{path}: {name!r} holds a standard deviation that is not positive; train again")
     return arrays
 
 

@@ -25,15 +25,19 @@ from syda_gym.agents.streams.ground import Ground
 from syda_gym.agents.streams.streams import score_streams
 from syda_gym.agents.training import Comparison, beside, compare_on_streams, train_stack, without_lead
 from syda_gym.embodiments.catalog import resolve
+from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
+from syda_gym.embodiments.robot import Robot
 from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.envs.teleop import SydaTeleopEnv
 from syda_gym.errors import AgentError, nearest_name
 from syda_gym.files import asset
+from syda_gym.locks import locked_folder
 from syda_gym.mappings.mapping import Mapping as MotionMapping
 from syda_gym.mappings.storage import save_mapping
 
 __all__ = [
+    "PlayedEpisode",
     "TrainingReport",
     "TunedRival",
     "compare_agents",
@@ -41,6 +45,7 @@ __all__ = [
     "export_bundle",
     "film",
     "find_agent",
+    "play_episode",
     "shipped_agents",
     "train_agent",
     "tune_rivals",
@@ -108,12 +113,24 @@ def train_agent(
         progress: called with the share that is done.
 
     Raises:
-        SydaError: bad options, nothing to resume, a bundle that does not fit.
+        SydaError: bad options, nothing to resume, a bundle that does not fit, a folder that another process writes.
     """
     settings = config or default_config(options)
-    folder = Path(out)
     if resume and isinstance(settings, ResidualConfig):
-        load_checkpoint(folder / "checkpoint.safetensors")  # before minutes of fitting and recording are spent
+        load_checkpoint(Path(out) / "checkpoint.safetensors")  # before minutes of fitting and recording are spent
+    with locked_folder(out, "agent") as folder:
+        return _train(options, folder, settings, base, seed, resume, progress)
+
+
+def _train(
+    options: TeleopOptions | Mapping[str, Any],
+    folder: Path,
+    settings: ResidualConfig | PredictorConfig,
+    base: str | os.PathLike[str],
+    seed: int,
+    resume: bool,
+    progress: Progress | None,
+) -> TrainingReport:
     ground = Ground(options)
     if isinstance(settings, PredictorConfig):
         below = find_agent(_named(base) or "kalman", ground.interface, ground.options.disturbances)
@@ -264,6 +281,64 @@ def compare_agents(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class PlayedEpisode:
+    """One episode as it went.
+
+    Attributes:
+        robot: who followed.
+        operator: who led.
+        q: the robot's joint angles ``(N, n)`` [rad].
+        reference: where it should have been ``(N, n)`` [rad].
+        frames: the operator's ``(N, F)``.
+        fps: control steps per second.
+        figures: how good it was.
+    """
+
+    robot: Robot
+    operator: Embodiment
+    q: FloatArray
+    reference: FloatArray
+    frames: FloatArray
+    fps: float
+    figures: Figures
+
+
+def play_episode(
+    options: TeleopOptions | Mapping[str, Any], agent: str | os.PathLike[str], *, clip: int | str = 0, seed: int = 0
+) -> PlayedEpisode:
+    """Plays one episode.
+
+    Args:
+        options: of the environment.
+        agent: see ``find_agent``.
+        clip: index or name.
+        seed: of disturbances.
+    """
+    from syda_gym.agents.figures import episode_figures
+
+    given = options if isinstance(options, TeleopOptions) else TeleopOptions(**options)
+    env = SydaTeleopEnv(options=TeleopOptions.of(given, {"action_mode": "position"}))
+    acting = find_agent(agent, env)
+    operator = env.layout["operator"]
+    try:
+        observation, _ = env.reset(seed=seed, options={"motion": clip})
+        acting.reset(1, seed)
+        rows: list[tuple[Any, ...]] = []
+        done = False
+        while not done:
+            seen = np.asarray(observation[operator], dtype=np.float64)
+            action = env.action_from_command(acting.act(observation[None])[0])
+            observation, _, terminated, truncated, info = env.step(np.asarray(action, dtype=np.float32))
+            rows.append((info["q"], info["reference"], info["contacts"], seen))
+            done = terminated or truncated
+    finally:
+        env.close()
+    q, reference, contacts, frames = (np.array(column) for column in zip(*rows, strict=True))
+    figures = episode_figures(env.robot, q, reference, contacts)
+    return PlayedEpisode(env.robot, resolve(given.operator), q, reference, frames, float(env.control_hz), figures)
+
+
 def film(
     options: TeleopOptions | Mapping[str, Any],
     agent: str | os.PathLike[str],
@@ -289,25 +364,9 @@ def film(
     from syda_gym.simulation.pictures.camera import Camera
     from syda_gym.simulation.pictures.video import write_video
 
-    given = options if isinstance(options, TeleopOptions) else TeleopOptions(**options)
-    env = SydaTeleopEnv(options=TeleopOptions.of(given, {"action_mode": "position"}))
-    acting = find_agent(agent, env)
-    operator = env.layout["operator"]
-    try:
-        observation, _ = env.reset(seed=seed, options={"motion": clip})
-        acting.reset(1, seed)
-        rows: list[tuple[Any, ...]] = []
-        done = False
-        while not done:
-            seen = np.asarray(observation[operator], dtype=np.float64)
-            action = env.action_from_command(acting.act(observation[None])[0])
-            observation, _, terminated, truncated, info = env.step(np.asarray(action, dtype=np.float32))
-            rows.append((info["q"], info["reference"], info["contacts"], seen))
-            done = terminated or truncated
-    finally:
-        env.close()
-    q, reference, contacts, frames = (np.array(column) for column in zip(*rows, strict=True))
-    with Camera(env.robot, resolve(given.operator)) as camera:
+    played = play_episode(options, agent, clip=clip, seed=seed)
+    q, reference, frames = played.q, played.reference, played.frames
+    with Camera(played.robot, played.operator) as camera:
 
         def pictures() -> Any:
             for index in range(len(q)):
@@ -315,10 +374,8 @@ def film(
                     progress((index + 1) / len(q))
                 yield camera.picture(q[index], reference=reference[index], operator=frames[index])
 
-        write_video(path, pictures(), fps=env.control_hz)
-    from syda_gym.agents.figures import episode_figures
-
-    return episode_figures(env.robot, q, reference, contacts)
+        write_video(path, pictures(), fps=played.fps)
+    return played.figures
 
 
 def export_bundle(

@@ -30,7 +30,7 @@ from syda_gym.cli.options import (
     pairs_of,
     route_of,
 )
-from syda_gym.cli.shared import console, counted, print_json, print_table, say_written, typed_command
+from syda_gym.cli.shared import console, counted, interruptible, print_json, print_table, say_written, typed_command
 
 __all__ = ["benchmark", "compare", "export_episodes", "suggest"]
 
@@ -57,9 +57,17 @@ def benchmark(
         typer.echo(yaml.safe_dump(settings.as_dict(), sort_keys=False), nl=False)
         return
     data = load_motions(settings.motions, settings.fps)
-    with counted() as tell:
+    kept = f"finished cells are kept in {out}; the same command goes on from there"
+    with interruptible(kept), counted() as (progress, inside):
         results = run_benchmark(
-            settings, out, workers=workers, motions=data, parquet=parquet, command=typed_command(), progress=tell
+            settings,
+            out,
+            workers=workers,
+            motions=data,
+            parquet=parquet,
+            command=typed_command(),
+            progress=progress,
+            inside=inside,
         )
     page = write_benchmark_report(results, data, out)
     if results.select(kind="episodes").rows:
@@ -144,17 +152,18 @@ def export_episodes(
     if (first, last) != (bodies[0], bodies[-1]):
         raise typer.BadParameter(f"{route} does not lead from {first} to {last}", param_hint="'--route'")
     named, chosen = mapping_of(method, preset, None)
-    stored = export_minari(
-        name,
-        motions=motions,
-        route=">".join(bodies),
-        method=f"{named}:{chosen}" if chosen else named,
-        agent=agent,
-        disturbance=disturbances,
-        episodes=episodes,
-        seed=seed,
-        command=typed_command(),
-    )
+    with interruptible("no data set was written; run the command again"):
+        stored = export_minari(
+            name,
+            motions=motions,
+            route=">".join(bodies),
+            method=f"{named}:{chosen}" if chosen else named,
+            agent=agent,
+            disturbance=disturbances,
+            episodes=episodes,
+            seed=seed,
+            command=typed_command(),
+        )
     say_written(f"{stored.episodes} episodes, {stored.steps} steps", stored.path)
 
 

@@ -9,14 +9,18 @@ import typer
 
 from syda_gym.cli import checks
 from syda_gym.cli.options import (
+    DEFAULT_VIEW,
     ActionOption,
+    AppearanceOption,
     AxesOption,
     CalibrationOption,
     MappingOption,
     MethodOption,
+    ModelOption,
     MotionsOption,
+    NewRecordingOption,
     OperatorOption,
-    OutFolderOption,
+    OwnMotionsOption,
     PictureOption,
     PresetOption,
     RobotOption,
@@ -25,6 +29,8 @@ from syda_gym.cli.options import (
     SinkOption,
     SourceOption,
     TokenOption,
+    ViewAddressOption,
+    ViewOption,
     ends_of,
     mapping_of,
     route_of,
@@ -35,6 +41,7 @@ from syda_gym.cli.spellings import Program
 if TYPE_CHECKING:
     from syda_gym.embodiments.robot import Robot
     from syda_gym.teleoperation.session import Session
+    from syda_gym.teleoperation.view.cockpit import Cockpit
 
 __all__ = ["record", "robot_app", "teleop"]
 
@@ -50,6 +57,9 @@ def _robot_add(
     torso: Annotated[str | None, typer.Option(help="Link in whose frame landmarks are expressed.")] = None,
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite a robot that was added before.")] = False,
     suggest: Annotated[bool, typer.Option(help="Also say which pair to record next.")] = True,
+    view: ViewOption = False,
+    view_address: ViewAddressOption = DEFAULT_VIEW,
+    appearance: AppearanceOption = None,
 ) -> None:
     """Find arms, hands and torso of a URDF, propose landmarks and a rest pose, and make it known by name."""
     import math
@@ -62,8 +72,9 @@ def _robot_add(
     verdict = added.verdict
     colour = {"good": "green", "fair": "yellow", "doubtful": "red"}[verdict.word]
     say.print(
-        f"[{colour}]{verdict.word}[/]: it points its limbs as a person does within {math.degrees(verdict.error):.1f} degrees "
-        f"on average (upper arms {math.degrees(verdict.upper):.1f}, forearms {math.degrees(verdict.fore):.1f})"
+        f"[{colour}]{verdict.word}[/]: it points its limbs as a person does within "
+        f"{math.degrees(verdict.error):.1f} degrees on average (upper arms "
+        f"{math.degrees(verdict.upper):.1f}, forearms {math.degrees(verdict.fore):.1f})"
     )
     if verdict.reason:
         say.print(f"likely reason: {verdict.reason}", markup=False)
@@ -82,9 +93,13 @@ def _robot_add(
         bodies = ["adult", "kid", "pepper", added.robot.name]
         known = [("adult", "kid"), ("kid", "pepper"), ("adult", "pepper")]
         people = {"adult", "kid"}  # a recording session pairs a person with a robot
-        pairs = [choice.pair for choice in rank(bodies, known, samples=2**16) if people & set(choice.pair)]
+        pairs = [choice.pair for choice in rank(bodies, known) if people & set(choice.pair)]
         best = next(pair for pair in pairs if added.robot.name in pair)
         say.print(f"record next: {best[0]} with {best[1]} (of the pairs with a person it connects most)")
+    if view:
+        from syda_gym.cli.viewing import view_robot
+
+        view_robot(added.robot, view_address, appearance)
 
 
 @robot_app.command("show")
@@ -134,7 +149,7 @@ def teleop(
     preset: PresetOption = None,
     mapping: MappingOption = None,
     route: RouteOption = "auto",
-    motions: MotionsOption = "embedded",
+    motions: OwnMotionsOption = None,
     action: ActionOption = None,
     speed: Annotated[
         float, typer.Option(help="Speed of a replay.", callback=checks.between(0.0, 1000.0, open_low=True))
@@ -178,6 +193,10 @@ def teleop(
         typer.Option(help="End after this time [s].", callback=checks.between(0.0, 1e9, "s", open_low=True)),
     ] = None,
     seed: SeedOption = 0,
+    view: ViewOption = False,
+    view_address: ViewAddressOption = DEFAULT_VIEW,
+    appearance: AppearanceOption = None,
+    model: ModelOption = None,
 ) -> None:
     """Drive a robot live: calibrate, map, filter, keep to limits and speeds, avoid self-collision, send."""
     from syda_gym.routes.choice import choose_mapping
@@ -188,7 +207,8 @@ def teleop(
 
     say = console()
     leader, follower = ends_of(operator, robot, route)
-    stored_or_method, preset = mapping_of(method, preset, mapping)
+    named, preset = mapping_of(method, preset, mapping)
+    stored_or_method = named if method or preset or mapping else "auto"
     with say.status("choosing or fitting the mapping"):
         chosen, notices = choose_mapping(
             leader,
@@ -205,22 +225,25 @@ def teleop(
         report = decide_anew(replay_journal, chosen)
         where = "" if report.exact else f"; the first other one is in line {report.first_difference}"
         say.print(f"{report.same} of {report.ticks} decisions are the same, bit for bit{where}")
-        raise typer.Exit(code=0 if report.exact else 1)
+        if report.damage:
+            say.print(f"[red]the journal is not whole[/]: {report.damage}")
+        raise typer.Exit(code=0 if report.exact and not report.damage else 1)
     settings = LoopSettings(
         rate=rate, calibration=calibration, axes=axes, speed=limit, bound_slow=bound_slow, bound_hold=bound_hold
     )
-    _end_gently()
-    with _Screen() as screen:
+    secret = read_token(token_file)
+    with _Screen(view_address if view else "", secret, appearance) as screen:
         stats = teleoperate(
             chosen,
             source,
             sink or ["bullet"],
             settings=settings,
-            token=read_token(token_file),
+            token=secret,
             speed=speed,
             actions=action or (),
             repeat=repeat,
             origins=tuple(origin or ()),
+            model=model,
             journal=journal,
             note={"mapping": stored_or_method, "motions": motions, "route": route, "source": source},
             seconds=seconds,
@@ -232,12 +255,13 @@ def teleop(
         f"{summary['commands']} commands for {summary['frames']} frames; latency median "
         f"{summary['latency_p50_ms']:.2f} ms, 99 % {summary['latency_p99_ms']:.2f} ms; states {summary['states']}"
     )
+    screen.say_more(say)
     if journal is not None:
         say_written("journal", journal)
 
 
 def record(
-    out: OutFolderOption,
+    out: NewRecordingOption = None,
     operator: OperatorOption = None,
     robot: RobotOption = None,
     motions: MotionsOption = "embedded",
@@ -258,12 +282,14 @@ def record(
     Without `--action` one take of each action is played; without `--sink` a window shows the robot.
     """
     from syda_gym.motions import write_dataset
+    from syda_gym.motions.recordings import new_recording
     from syda_gym.teleoperation.addresses import make_sink, make_source, read_token
     from syda_gym.teleoperation.setup.record_session import RecordingOptions, choose_prompts, record_session
 
     say = console()
     performer, player = ends_of(operator, robot)
     clips, leader = choose_prompts(motions, player, performer, actions=action or (), takes=takes)
+    out = out or new_recording(leader.name, clips[0].body.name)
     token = read_token(token_file)
     listener = make_source(source, leader, token=token, calibration=calibration)
     options = RecordingOptions(calibration=calibration, axes=axes, countdown=countdown)
@@ -280,16 +306,24 @@ def record(
     show_table(("action", "takes", "frames", "lag [s]", "correlation", "verdict"), rows)
     for recording, reason in session.left_out.items():
         say.print(f"- {recording} left out: {reason}", markup=False)
-    say_written("written", out, f"(check it: syda-gym motions check {out})")
+    say_written("written", out, f"(check it: syda-gym motions check {out}, then: syda-gym fit {out})")
 
 
 class _Screen:
-    """The live table and the keyboard of ``teleop``."""
+    """The live table, the keyboard and the page of ``teleop``.
 
-    def __init__(self) -> None:
+    Args:
+        page: address of the page; empty for none.
+        token: that opens it; a new one if not given.
+        appearance: another URDF to show there.
+    """
+
+    def __init__(self, page: str, token: str | None, appearance: Path | None) -> None:
         from contextlib import ExitStack
 
         self._stack = ExitStack()
+        self._page, self._token, self._appearance = page, token, appearance
+        self._cockpit: Cockpit | None = None
         self._session: Session | None = None
         self._live: Any = None
         self._next = 0.0
@@ -300,12 +334,37 @@ class _Screen:
         from syda_gym.teleoperation.screen import keyboard, status_table
 
         self._session = session
+        if self._page:
+            self._cockpit = self._stack.enter_context(self._open_page(session))
+            console().print(f"view: {self._cockpit.address}", markup=False, highlight=False, soft_wrap=True)
         self._stack.enter_context(keyboard(session.source.inbox))
         table = status_table(session.loop, session.source, session.statistics)
         self._live = self._stack.enter_context(Live(table, console=console(stderr=True), auto_refresh=False))
 
+    def _open_page(self, session: Session) -> Cockpit:
+        from syda_gym.teleoperation.addresses import host_and_port
+        from syda_gym.teleoperation.view.cockpit import Cockpit
+
+        host, port = host_and_port(self._page, 8099)
+        return Cockpit(
+            session.loop, session.source, session.sink, session.statistics, host=host, port=port, token=self._token,
+            appearance=self._appearance,
+        )  # fmt: skip
+
+    def say_more(self, say: Any) -> None:
+        """After the run: where the time of a picture went, and what was recorded."""
+        from syda_gym.teleoperation.incoming.camera import PictureSource
+        from syda_gym.teleoperation.view.words import latency_words
+
+        if self._session is not None and isinstance(self._session.source, PictureSource):
+            say.print(latency_words(self._session.source, self._session.statistics), markup=False)
+        if self._cockpit is not None and self._cockpit.recorder.message:
+            say.print(self._cockpit.recorder.message, markup=False, soft_wrap=True)
+
     def update(self, decision: Any) -> None:
         """Twice a second; drawing takes longer than deciding."""
+        if self._cockpit is not None:
+            self._cockpit.update(decision)
         if self._session is None or decision.now < self._next:
             return
         from syda_gym.teleoperation.screen import status_table
@@ -318,16 +377,10 @@ class _Screen:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stack.close()
+        from contextlib import suppress
 
-
-def _end_gently() -> None:
-    """Makes a termination signal end the run as Ctrl-C does, with the robot going to rest."""
-    import signal
-    import threading
-
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        with suppress(OSError):  # the terminal was closed; the robot is home all the same
+            self._stack.close()
 
 
 def _print_robot(robot: Robot) -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+from types import FrameType
 from typing import Annotated
 
 import typer
 
-from syda_gym.cli import benchmark, live, motions, routes, studies
+from syda_gym.cli import benchmark, fit, live, motions, routes, studies
 from syda_gym.cli.acting import agents, tune
-from syda_gym.cli.shared import console
+from syda_gym.cli.shared import Interrupted, console
 from syda_gym.cli.spellings import Program
 from syda_gym.errors import SydaError
 
@@ -25,15 +27,38 @@ app = Program(
 
 
 def main() -> None:
-    """Runs the command line; an error of the library is one clear line and exit code 2."""
+    """Runs the command line; an error of the library is one clear line and exit code 2.
+
+    Ctrl-C and a request to terminate are one line, too, that says where to go on; their exit codes are 130 and 143.
+    """
+    stopped_by: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        stopped_by.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)
     try:
         app(prog_name="syda-gym")
     except SydaError as error:
         console(stderr=True).print(f"error: {error}", style="bold red", markup=False, highlight=False, soft_wrap=True)
         sys.exit(2)
+    except Interrupted as interrupt:
+        _say_interrupted(str(interrupt))
+        sys.exit(128 + interrupt.signal)
+    except SystemExit as end:
+        if end.code == 128 + signal.SIGINT:  # Typer's own answer to Ctrl-C, which says nothing
+            _say_interrupted("nothing was kept; run the command again")
+            sys.exit(128 + (stopped_by or [signal.SIGINT])[0])
+        raise
     except KeyboardInterrupt:
-        console(stderr=True).print("interrupted", style="bold red")
-        sys.exit(130)
+        _say_interrupted("")
+        sys.exit(128 + (stopped_by or [signal.SIGINT])[0])
+
+
+def _say_interrupted(where: str) -> None:
+    text = f"interrupted: {where}" if where else "interrupted"
+    console(stderr=True).print(text, style="bold red", markup=False, highlight=False, soft_wrap=True)
 
 
 @app.callback(invoke_without_command=True)
@@ -59,6 +84,7 @@ app.command()(tune.tune)
 app.command()(agents.evaluate)
 app.command()(agents.play)
 app.command()(agents.export)
+app.command()(fit.fit)
 app.command()(live.teleop)
 app.command()(live.record)
 app.command()(benchmark.benchmark)

@@ -8,7 +8,22 @@ from typing import Annotated
 import typer
 
 from syda_gym.cli import checks
-from syda_gym.cli.options import FpsOption, JsonOption, OutFolderOption, PictureOption, SpecArgument
+from syda_gym.cli.options import (
+    DEFAULT_VIEW,
+    FpsOption,
+    JointsOption,
+    JsonOption,
+    LayoutOption,
+    OutFolderOption,
+    PersonOption,
+    PictureOption,
+    SpecArgument,
+    UnitOption,
+    UpOption,
+    ViewAddressOption,
+    ViewOption,
+    said_of,
+)
 from syda_gym.cli.shared import console, print_json, say_written, show_table
 from syda_gym.cli.spellings import Program
 
@@ -22,15 +37,24 @@ def _motions_info(
     spec: SpecArgument,
     picture: PictureOption = None,
     as_json: JsonOption = False,
+    fps: FpsOption = None,
+    joints: JointsOption = None,
+    unit: UnitOption = None,
+    up: UpOption = None,
+    person: PersonOption = None,
+    layout: LayoutOption = None,
+    view: ViewOption = False,
+    view_address: ViewAddressOption = DEFAULT_VIEW,
 ) -> None:
     """Say what a recording holds: bodies, actions, rate, gaps, and the units and axes that were found."""
     import warnings
 
-    from syda_gym.motions import MotionWarning, describe
+    from syda_gym.motions import MotionWarning, describe, load_motions
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MotionWarning)  # the notes below say the same
-        info = describe(spec, picture=picture)
+        loaded = load_motions(spec, fps=fps, **said_of(joints, unit, up, person, layout))
+        info = describe(loaded, picture=picture)
     if as_json:
         print_json(info.to_dict())
         return
@@ -61,6 +85,10 @@ def _motions_info(
         say.print(f"- {note}", markup=False)
     if picture is not None:
         say_written("picture", picture)
+    if view:
+        from syda_gym.cli.viewing import view_motions
+
+        view_motions(loaded, view_address)
 
 
 @motions_app.command("check")
@@ -93,13 +121,18 @@ def _motions_convert(
     operator: Annotated[
         str, typer.Option(help="Re-express the recorded operator as this human of the catalog, say `adult`.")
     ] = "",
+    joints: JointsOption = None,
+    unit: UnitOption = None,
+    up: UpOption = None,
+    person: PersonOption = None,
+    layout: LayoutOption = None,
 ) -> None:
     """Convert a recording into a motion file or a data set folder."""
     from syda_gym.embodiments import HumanSkeleton, catalog
     from syda_gym.errors import EmbodimentError
     from syda_gym.motions import conformed, load_motions, save_motions, write_dataset
 
-    motions = load_motions(spec, fps=fps)
+    motions = load_motions(spec, fps=fps, **said_of(joints, unit, up, person, layout))
     if operator:
         body = catalog.get(operator)
         if not isinstance(body, HumanSkeleton):

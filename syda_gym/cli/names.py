@@ -32,11 +32,14 @@ __all__ = [
 BODIES = ("adult", "kid", "pepper", "nao", "child", "left_only", "long_arms", "stiff", "tall")
 """Bodies of the catalog; robots that the user added come to them."""
 
-FORMATS = ("paper", "pairs", "npz", "bvh", "kinect", "openni", "mediapipe")
+FORMATS = (
+    "paper", "pairs", "npz", "bvh", "c3d", "bag", "kinect", "azure", "openni", "film", "mediapipe", "keypoints",
+    "table",
+)  # fmt: skip
 """Prefixes of ``format:PATH``; see ``syda-gym motions formats``."""
 
 METHODS: dict[str, tuple[str, ...]] = {
-    "syda": ("general", "nested", "accurate", "interpolation", "paper"),
+    "syda": ("general", "synergies", "nested", "accurate", "interpolation", "paper"),
     "direct": ("general", "paper"),
     "ridge": ("general",),
     "kernel_ridge": ("general",),
@@ -63,10 +66,10 @@ SINGLE_DISTURBANCES = (
 PROTOCOLS = ("rand3", "twin3", "loao")
 """Ways to hold out frames."""
 
-DEFINITIONS = ("general", "paper")
+DEFINITIONS = ("dry_run", "general", "paper")
 """Definitions of transferability."""
 
-PREDICTORS = ("T", "C", "L", "coverage", "arm_length_ratio", "hops", "measured")
+PREDICTORS = ("dry_run", "T", "C", "L", "coverage", "arm_length_ratio", "hops", "measured")
 """What a route can be chosen by."""
 
 RIVALS = ("base", "lead", "one_euro", "one_euro_lead", "ema_lead", "projection", "projection_lead", "kalman")
@@ -100,10 +103,10 @@ PHYSICS = ("bullet", "servo")
 REFERENCES = ("paired", "mapped")
 """What errors are measured against."""
 
-AXES = ("kinect", "ros", "camera")
+AXES = ("kinect", "ros", "camera", "unity")
 """Axes of a live source."""
 
-SOURCES = ("replay:SPEC", "udp:PORT", "udp:HOST:PORT", "ws:PORT")
+SOURCES = ("camera[:N]", "film:FILE.mp4", "replay:SPEC", "udp:PORT", "udp:HOST:PORT", "ws:PORT")
 """How live sources are written."""
 
 SINKS = ("bullet", "window", "video:FILE.mp4", "udp:HOST:PORT", "naoqi:URL", "none")

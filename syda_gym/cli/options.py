@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -28,8 +28,10 @@ from syda_gym.errors import nearest_name
 
 __all__ = [
     "AGENT_HELP",
+    "DEFAULT_VIEW",
     "ActionOption",
     "AgentOption",
+    "AppearanceOption",
     "AxesOption",
     "BodiesArgument",
     "CalibrationOption",
@@ -38,30 +40,43 @@ __all__ = [
     "DisturbancesOption",
     "FpsOption",
     "HeldOutOption",
+    "JointsOption",
     "JsonOption",
+    "LayoutOption",
     "MappingOption",
     "MaxHopsOption",
     "MethodOption",
     "MethodsOption",
+    "ModelOption",
     "MotionsOption",
+    "NewRecordingOption",
     "OperatorOption",
     "OutFolderOption",
+    "OwnMotionsOption",
     "PairOption",
+    "PersonOption",
     "PhysicsHzOption",
     "PictureOption",
     "PresetOption",
     "RobotOption",
     "RouteOption",
     "SeedOption",
+    "SensorOption",
     "SinkOption",
     "SourceOption",
     "SpecArgument",
     "TokenOption",
+    "UnitOption",
+    "UpOption",
+    "ViewAddressOption",
+    "ViewOption",
     "WorkersOption",
     "ends_of",
     "mapping_of",
     "pairs_of",
     "route_of",
+    "said_of",
+    "sensors_of",
 ]
 
 _SPEC = f"`embedded`, a path, or `FORMAT:PATH` with one of {ticked(FORMATS)}."
@@ -72,6 +87,13 @@ _METHOD_HELP = "; ".join(
 
 MotionsOption = Annotated[str, typer.Option("--motions", "-m", help=f"Recordings: {_SPEC}", metavar="SPEC")]
 SpecArgument = Annotated[str, typer.Argument(help=f"A recording: {_SPEC}", metavar="SPEC")]
+OwnMotionsOption = Annotated[
+    str | None,
+    typer.Option("--motions", "-m", help=f"Fitted on; by default what you recorded: {_SPEC}", metavar="SPEC"),
+]
+NewRecordingOption = Annotated[
+    Path | None, typer.Option("--out", "-o", help="Folder of the data set; by default where `fit` and `teleop` look.")
+]
 OutFolderOption = Annotated[
     Path, typer.Option("--out", "-o", help="Folder to write to; created if need be.", callback=checks.folder)
 ]
@@ -163,12 +185,18 @@ AGENT_HELP = f"A bundle's path, a rival ({ticked(RIVALS)}) or a shipped agent ({
 """What stands in the help of an argument that takes any agent."""
 
 DefinitionOption = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--definition", help=f"Of transferability: {ticked(DEFINITIONS)}.",
         callback=checks.one_of(DEFINITIONS, "definition"),
     ),
 ]  # fmt: skip
+SensorOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--sensor", help="Noise of a body's landmarks in the dry run [m], repeatable: `kid=0.015`.", metavar="BODY=M"
+    ),
+]
 CountOption = Annotated[int, typer.Option("--count", help="How many to list at most.", min=1)]
 MaxHopsOption = Annotated[int | None, typer.Option("--max-hops", help="Longest chain, in links.", min=1)]
 PhysicsHzOption = Annotated[
@@ -208,6 +236,32 @@ CalibrationOption = Annotated[
 TokenOption = Annotated[
     Path | None, typer.Option("--token-file", help="File with the secret that packets carry beyond this machine.")
 ]
+
+DEFAULT_VIEW = "127.0.0.1:8099"
+ViewOption = Annotated[bool, typer.Option("--view", help="Show it live on a page in the browser (extra `view`).")]
+ViewAddressOption = Annotated[
+    str, typer.Option("--view-address", help="Where the page listens; port 0 takes any that is free.")
+]
+AppearanceOption = Annotated[
+    Path | None,
+    typer.Option("--appearance", help="Another URDF of the robot to show on the page, say the vendor's with meshes."),
+]
+ModelOption = Annotated[
+    Path | None, typer.Option("--model", help="Pose model of cameras and films, a `.task` file (extra `camera`).")
+]
+
+JointsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--joints", help="Which joint is which: `LShoulder=NAME`, a number, or columns `X,Y,Z`.", metavar="JOINT=PLACE"
+    ),
+]
+UnitOption = Annotated[
+    str | None, typer.Option("--unit", help="Unit of length of the file: m, cm, mm, in, ft, or metres per unit.")
+]
+UpOption = Annotated[str | None, typer.Option("--up", help="Axis of the file that points up: y, z, -y, ...")]
+PersonOption = Annotated[int | None, typer.Option("--person", help="Which of several people, from 1.", min=1)]
+LayoutOption = Annotated[Path | None, typer.Option("--layout", help="A YAML file that describes a format of your own.")]
 
 
 def route_of(text: str) -> str | tuple[str, ...]:
@@ -256,3 +310,40 @@ def mapping_of(method: str | None, preset: str | None, mapping: Path | None) -> 
             f"method {name!r} has no preset {chosen!r}; {nearest_name(chosen, METHODS[name])}", param_hint="'--preset'"
         )
     return name, chosen
+
+
+def said_of(
+    joints: list[str] | None, unit: str | None, up: str | None, person: int | None, layout: Path | None
+) -> dict[str, Any]:
+    """What a person says about a recording, as ``load_motions`` takes it."""
+    from syda_gym.errors import OptionError
+
+    pairs = [text.partition("=") for text in joints or ()]
+    for name, sign, place in pairs:
+        if not sign or not name or not place:
+            raise OptionError(f"--joints {name}{sign}{place}: expected JOINT=PLACE, for example LShoulder=LeftArm")
+    return {
+        "joints": {name: place for name, _, place in pairs} or None,
+        "unit": unit,
+        "up": up,
+        "person": person,
+        "layout": layout,
+    }
+
+
+def sensors_of(values: list[str] | None) -> dict[str, float] | None:
+    """``BODY=M`` as body to metres.
+
+    Raises:
+        BadParameter: something else.
+    """
+    found: dict[str, float] = {}
+    for text in values or ():
+        name, _, number = text.partition("=")
+        try:
+            found[name] = float(number)
+        except ValueError:
+            raise typer.BadParameter(
+                f"expected BODY=METRES such as kid=0.015, got {text!r}", param_hint="'--sensor'"
+            ) from None
+    return found or None

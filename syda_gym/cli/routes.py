@@ -20,28 +20,32 @@ from syda_gym.cli.options import (
     PictureOption,
     RobotOption,
     SeedOption,
+    SensorOption,
     ends_of,
     pairs_of,
+    sensors_of,
 )
-from syda_gym.cli.shared import print_json, print_table, stages
+from syda_gym.cli.shared import interruptible, print_json, print_table, stages
 
 __all__ = ["route", "transferability"]
 
 
 def transferability(
     bodies: BodiesArgument = None,
-    definition: DefinitionOption = "general",
+    definition: DefinitionOption = "dry_run",
     validate: Annotated[bool, typer.Option("--validate", help="Measure whether it predicts held-out errors.")] = False,
     motions: MotionsOption = "embedded",
+    sensor: SensorOption = None,
     folds: Annotated[int, typer.Option("--folds", help="Groups of actions to hold out (`--validate`).", min=2)] = 4,
     max_hops: MaxHopsOption = None,
     picture: PictureOption = None,
     seed: SeedOption = 0,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure how well each body can stand in for each other one, term by term.
+    """Predict how well each body can follow each other one, before anything is recorded.
 
-    The picture shows clouds and regions of the first pair; with `--validate` predictions beside measured errors.
+    The dry run plans the synthetic motions that come along, and those of `--motions` beside them. The picture shows
+    workspaces of the first pair; with `--validate` predictions beside measured errors.
     """
     from itertools import permutations
 
@@ -53,7 +57,8 @@ def transferability(
     if validate:
         from syda_gym.evaluation.prediction.study import validate as measure_prediction
 
-        with stages({"fit": "Fitting every pair and fold", "chains": "Scoring every chain"}) as tell:
+        words = {"fit": "Fitting every pair and fold", "chains": "Scoring every chain"}
+        with interruptible("nothing was kept; run the command again"), stages(words) as tell:
             study = measure_prediction(
                 motions, bodies=bodies or None, folds=folds, max_hops=max_hops or 3, seed=seed, progress=tell
             )
@@ -76,11 +81,12 @@ def transferability(
     if len(names) == 1:  # one body: how it leads and follows the others
         pairs = [(a, b) for a, b in pairs if distinct[0] in (a, b)]
     kind: Any = definition  # checked, with the nearest name, where it is used
-    links = [measure(a, b, kind, seed=seed) for a, b in pairs]
+    options = _plan_of(motions, sensor) if kind == "dry_run" else {}
+    links = [measure(a, b, kind, seed=seed, **options) for a, b in pairs]
     if picture:
         from syda_gym.routes.pictures import clouds_png
 
-        write_bytes(picture, clouds_png(*pairs[0], kind, seed=seed))
+        write_bytes(picture, clouds_png(*pairs[0], "paper" if kind == "paper" else "general", seed=seed))
     print_json([link.as_dict() for link in links]) if as_json else print_table(links_table(links))
 
 
@@ -89,21 +95,22 @@ def route(
     robot: RobotOption = None,
     pairs: PairOption = None,
     motions: MotionsOption = "embedded",
-    definition: DefinitionOption = "general",
+    definition: DefinitionOption = None,
+    sensor: SensorOption = None,
     max_hops: MaxHopsOption = None,
     predictor: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--predictor", help=f"What decides: {ticked(PREDICTORS)}.", callback=checks.one_of(PREDICTORS, "predictor")
         ),
-    ] = "T",
+    ] = None,
     count: CountOption = 5,
     noise: Annotated[bool, typer.Option("--noise", help="Take alpha from the noise of the recordings.")] = False,
     suggest: Annotated[bool, typer.Option("--suggest", help="Also say which pair to record next.")] = False,
     picture: PictureOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Choose the chain of bodies from operator to robot that transferability ranks best.
+    """Choose the chain of bodies from operator to robot that is expected to do best.
 
     Fitted pairs are those of `--pair`, by default all that were recorded together in the motions.
     """
@@ -115,7 +122,9 @@ def route(
     kind: Any = definition  # checked, with the nearest name, where it is used
     source, target = ends_of(operator, robot)
     fitted, bodies = _fitted_pairs(pairs_of(pairs), motions)
-    options: dict[str, Any] = {"max_hops": max_hops, "predictor": predictor}
+    options: dict[str, Any] = {"predictor": predictor}
+    if predictor in (None, "dry_run") and kind in (None, "dry_run") and not noise:
+        options |= _plan_of(motions, sensor)
     if predictor == "measured":
         from syda_gym.evaluation.prediction.study import measure_bodies
 
@@ -132,19 +141,17 @@ def route(
     for name in (source, target):
         if name not in known:
             catalog.resolve(name)  # a body that nobody knows is told as such, not as one without a fitted pair
-    best = routing.best_route(source, target, fitted, kind, **options)
-    ranked = routing.ranked_routes(source, target, fitted, kind, count=count, **options)
+    best = routing.best_route(source, target, fitted, kind, max_hops=max_hops, **options)
+    ranked = routing.ranked_routes(source, target, fitted, kind, count=count, max_hops=max_hops, **options)
     routes = [best, *(other for other in ranked if other.bodies != best.bodies)][:count]
     further, spanning = None, None
     if suggest:
-        further = suggestion.suggest(bodies, fitted, kind, **options)[:count]
-        spanning = suggestion.spanning_pairs(
-            bodies, (), kind, predictor=options["predictor"], alpha=options.get("alpha")
-        )
+        further = suggestion.suggest(bodies, fitted, kind, max_hops=max_hops, **options)[:count]
+        spanning = suggestion.spanning_pairs(bodies, (), kind, **options)
     if picture:
         from syda_gym.routes.pictures import graph_png
 
-        graph = routing.BodyGraph((), fitted, kind, predictor=options["predictor"], alpha=options.get("alpha"))
+        graph = routing.BodyGraph((), fitted, kind, **options)
         write_bytes(picture, graph_png(graph, best))
     if as_json:
         print_json({
@@ -153,9 +160,14 @@ def route(
             "spanning": spanning.pairs if spanning else [],
         })  # fmt: skip
         return
-    print_table(routes_table(routes, predictor))
+    print_table(routes_table(routes, predictor or "T"))
     if further is not None:
         print_table(suggestions_table(further, spanning))
+
+
+def _plan_of(motions: str, sensor: list[str] | None) -> dict[str, Any]:
+    """Options of the dry run: the user's motions beside those that come along, and the noise of sensors."""
+    return {"motions": None if motions == "embedded" else motions, "sensor": sensors_of(sensor)}
 
 
 def _fitted_pairs(pairs: list[tuple[str, str]], motions: str) -> tuple[list[tuple[Any, Any]], list[Any]]:

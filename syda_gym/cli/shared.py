@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -14,9 +16,11 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 __all__ = [
+    "Interrupted",
     "bar",
     "console",
     "counted",
+    "interruptible",
     "print_json",
     "print_table",
     "say_written",
@@ -24,6 +28,59 @@ __all__ = [
     "stages",
     "typed_command",
 ]
+
+
+class Interrupted(BaseException):
+    """A command was stopped; the message says where to go on. No ``KeyboardInterrupt``, which Typer would swallow.
+
+    Attributes:
+        signal: number of the signal that stopped it.
+    """
+
+    def __init__(self, where: str, number: int) -> None:
+        super().__init__(where)
+        self.signal = number
+
+
+_REPEAT_SECONDS = 6.0  # longer than a pool needs to end deaf workers
+
+
+@contextmanager
+def interruptible(where: str | Callable[[], str]) -> Iterator[None]:
+    """Turns Ctrl-C and a request to terminate inside the block into one line.
+
+    An exception is lost where Python cannot raise it, in a callback or a destructor; so an interrupt that did not end
+    the block is repeated.
+
+    Args:
+        where: what was kept and how to go on, or a function that says so once it is known.
+    """
+    stopped_by: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        stopped_by.append(number)
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, _REPEAT_SECONDS)
+        raise KeyboardInterrupt
+
+    names = [name for name in ("SIGINT", "SIGTERM", "SIGALRM") if hasattr(signal, name)]
+    try:
+        before = {name: signal.signal(getattr(signal, name), stop) for name in names}
+    except ValueError:  # not the main thread, which alone may listen: somebody else decides there
+        yield
+        return
+    try:
+        yield
+    except KeyboardInterrupt as interrupt:
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        text = where if isinstance(where, str) else where()
+        raise Interrupted(text, (stopped_by or [signal.SIGINT])[0]) from interrupt
+    finally:
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        for name, handler in before.items():
+            signal.signal(getattr(signal, name), handler or signal.SIG_DFL)
 
 
 def console(*, stderr: bool = False) -> Console:
@@ -89,14 +146,26 @@ def bar(words: str) -> Iterator[Callable[[float], None]]:
 
 
 @contextmanager
-def counted() -> Iterator[Callable[[int, int, str], None]]:
-    """A progress bar over cells; yields a function that is told how many of how many, and the last one's name."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+def counted() -> Iterator[tuple[Callable[[int, int, str], None], Callable[[float, str], None]]]:
+    """A progress bar over cells that moves within them, too.
 
-    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=console(stderr=True)) as progress:
-        task = progress.add_task("", total=None)
-        yield lambda done, count, name: progress.update(task, completed=done, total=count, description=name)
+    Yields:
+        A function that is told how many of how many and the last one's name, and one that is told how much of the
+        running ones is done and the name of one.
+    """
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (BarColumn(), TextColumn("{task.fields[cells]}"), TimeRemainingColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=console(stderr=True)) as shown:
+        task = shown.add_task("", total=None, cells="")
+        finished = 0
+
+        def progress(done: int, count: int, name: str) -> None:
+            nonlocal finished
+            finished = done
+            shown.update(task, completed=done, total=count, description=name, cells=f"{done}/{count}")
+
+        yield progress, lambda part, name: shown.update(task, completed=finished + part, description=name)
 
 
 @contextmanager

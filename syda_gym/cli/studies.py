@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +12,7 @@ import typer
 from syda_gym.cli import checks
 from syda_gym.cli.names import METHODS, PROTOCOLS, ticked
 from syda_gym.cli.options import MethodsOption, MotionsOption, OutFolderOption, SeedOption
-from syda_gym.cli.shared import console, print_table, say_written, stages, typed_command
+from syda_gym.cli.shared import console, interruptible, print_table, say_written, stages, typed_command
 
 __all__ = ["demo", "reproduce_paper"]
 
@@ -36,7 +38,10 @@ def demo(
         "residual": "Training the residual policy",
         "report": "Drawing the report",
     }
-    with stages(words) as tell:
+    with (
+        interruptible(f"nothing half-written is in {out}; run the demo again, it takes about a minute"),
+        stages(words) as tell,
+    ):
         result = run_demo(
             motions, out, robot=robot, seed=seed, residual=residual, command=typed_command(), progress=tell
         )
@@ -69,7 +74,8 @@ def reproduce_paper(
     from syda_gym.evaluation.paper.study import reproduce
     from syda_gym.motions.clip import PROTOCOLS
 
-    with stages({"study": "Fitting and scoring"}) as tell:
+    kept = f"finished parts are kept in {out}; the same command goes on from there"
+    with interruptible(kept), _parts() as (progress, inside):
         study = reproduce(
             motions,
             out,
@@ -77,16 +83,44 @@ def reproduce_paper(
             protocols=tuple(protocol) if protocol else PROTOCOLS,
             contenders=[_contender(text) for text in method] if method else None,
             workers=workers,
-            progress=lambda fraction, _: tell("study", fraction),
+            progress=progress,
+            inside=inside,
         )
     for table in tables(study):
         print_table(table)
     for name, reason in study.skipped.items():
         console(stderr=True).print(f"left out {name}: {reason}", markup=False)
+    for name, trace in study.failed.items():
+        last = trace.strip().splitlines()[-1]
+        console(stderr=True).print(f"failed: {name}: {last}", style="red", markup=False, soft_wrap=True)
     say_written("tables, plots and study.json", out)
+    if study.failed:
+        raise typer.Exit(code=1)
 
 
 def _contender(text: str) -> str:
     """``NAME[:PRESET]`` as the study calls it: ``NAME/PRESET``, with the default preset where none is named."""
     name, _, preset = text.partition(":")
     return f"{name}/{preset or METHODS[name][0]}"
+
+
+@contextmanager
+def _parts() -> Iterator[tuple[Callable[[float, str], None], Callable[[float, str], None]]]:
+    """A progress bar that moves within parts, too, and names the part that is being computed."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        BarColumn(),
+        TextColumn("{task.percentage:>5.1f} %"),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}"),
+    )
+    with Progress(*columns, console=console(stderr=True)) as bar:
+        task = bar.add_task("reading", total=1.0)
+
+        def finished(fraction: float, name: str) -> None:
+            bar.update(task, completed=fraction, description=name)
+            if not bar.console.is_terminal:
+                bar.console.print(f"{100 * fraction:5.1f} %  {name}", markup=False, highlight=False)
+
+        yield finished, lambda fraction, name: bar.update(task, completed=fraction, description=name)

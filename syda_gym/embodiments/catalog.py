@@ -8,6 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from syda_gym import files
 from syda_gym.embodiments.embodiment import Embodiment
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.parametric import PARAMETRIC_HUMANS
@@ -101,8 +102,7 @@ def from_spec(spec: dict[str, Any]) -> Embodiment:
 
 def user_folder() -> Path:
     """Where ``syda-gym robot add`` keeps descriptions: ``$SYDA_GYM_HOME/robots`` or ``~/.syda_gym/robots``."""
-    home = os.environ.get("SYDA_GYM_HOME")
-    return (Path(home) if home else Path.home() / ".syda_gym") / "robots"
+    return files.user_folder("robots")
 
 
 @lru_cache(maxsize=256)

@@ -13,6 +13,7 @@ import yaml
 
 from syda_gym.embodiments.embodiment import Side
 from syda_gym.errors import EmbodimentError, nearest_name
+from syda_gym.files import read_yaml, shortened
 
 __all__ = ["POINTS", "ArmDescription", "CoupledLimit", "Point", "RobotDescription"]
 
@@ -105,14 +106,14 @@ class RobotDescription:
         file = Path(path)
         if not file.is_file():
             raise EmbodimentError(f"no robot description {file}; write one with `syda-gym robot add URDF`")
+        data = read_yaml(file, "a robot description (YAML)", EmbodimentError)  # within the budget for strangers' files
         try:
-            text = file.read_text(encoding="utf-8")
-            data, node = yaml.safe_load(text), yaml.compose(text, Loader=yaml.SafeLoader)
+            node = yaml.compose(file.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
         except (yaml.YAMLError, ValueError, RecursionError) as error:
             raise EmbodimentError(f"{file} is not valid YAML: {error}") from error
         needed = {"name", "urdf", "torso", "height", "arms"}
         if not isinstance(data, dict) or not needed <= set(data):
-            raise EmbodimentError(f"{file}: expected the keys {sorted(needed)}, got {data and sorted(map(str, data))}")
+            raise EmbodimentError(f"{file}: expected the keys {sorted(needed)}, got {shortened(data)}")
         reader = _Reader(file, data, node)
         reader.refuse_unknown(needed | {"coupled_limits", "rest", "disabled_collisions", "axes"})
         return cls(

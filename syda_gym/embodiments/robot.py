@@ -240,8 +240,9 @@ def _refuse_followers(tree: UrdfTree, arm: ArmDescription) -> None:
         mimic = None if tree.joints[name].type == "fixed" else tree.joints[name].mimic
         if mimic is not None and mimic.multiplier and mimic.joint in arm.joints and name not in arm.joints:
             raise EmbodimentError(
-                f"{tree.path.name}: joint {name!r} of the {arm.side} arm follows {mimic.joint!r} (<mimic>), and arms are "
-                "made of joints that move by themselves; make it fixed, or take its <mimic> away and name it in `joints`"
+                f"{tree.path.name}: joint {name!r} of the {arm.side} arm follows {mimic.joint!r} (<mimic>), and "
+                "arms are made of joints that move by themselves; make it fixed, or take its <mimic> away and name it "
+                "in `joints`"
             )
 
 

@@ -7,6 +7,7 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.envs.fleet import Fleet
 from syda_gym.envs.task.observation import ObservationLayout
 from syda_gym.envs.task.options import TeleopOptions
+from syda_gym.errors import SydaError
 from syda_gym.simulation.rates import Rates
 
 __all__ = ["Face"]
@@ -21,6 +22,16 @@ class Face:
 
     options: TeleopOptions
     _fleet: Fleet
+    _released = False
+
+    def _check_open(self, what: str) -> None:
+        """Refuses to go on after ``close``.
+
+        Raises:
+            SydaError: the environment is closed.
+        """
+        if self._released:
+            raise SydaError(f"{what} was called after close, which released the physics; make a new environment")
 
     @property
     def layout(self) -> ObservationLayout:

@@ -55,6 +55,7 @@ class Fleet:
     Args:
         options: of the environment.
         count: number of robots, B.
+        max_steps: after so many steps an episode is cut off; ``None`` plays clips to their end.
 
     Attributes:
         layout: of the observation.
@@ -63,9 +64,10 @@ class Fleet:
         truncated: ``(B,)``.
     """
 
-    def __init__(self, options: TeleopOptions, count: int) -> None:
+    def __init__(self, options: TeleopOptions, count: int, max_steps: int | None = None) -> None:
         self.options = options
         self.count = count
+        self._max_steps = max_steps
         self.rates = options.rates
         self.repertoire = Repertoire(options)
         self.robot = self.repertoire.robot
@@ -154,7 +156,8 @@ class Fleet:
                 self._conditions[index] = conditions
                 self.world.set_conditions(index, conditions)
         self._start[rows] = self._frame[rows] = k = self._k[rows]
-        self._length[rows] = self._scripts.lengths[self.clip[rows]]
+        length = self._scripts.lengths[self.clip[rows]]
+        self._length[rows] = length if self._max_steps is None else np.minimum(length, k + self._max_steps)
         base = self._scripts.base(rows, k)[:, : self._n]
         self.world.reset(index_rows, base)
         self._start_q[rows] = base

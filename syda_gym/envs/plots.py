@@ -9,10 +9,11 @@ import numpy as np
 
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
+from syda_gym.look import COMMAND, REFERENCE, ROBOT
 
 __all__ = ["tracking_figure"]
 
-_COLORS = {"reference": "#8a93a3", "command": "#e08a3c", "robot": "#2f6fde"}
+_COLORS = {"reference": REFERENCE, "command": COMMAND, "robot": ROBOT}
 
 
 def tracking_figure(robot: Robot, infos: Sequence[dict[str, Any]], dt: float) -> Any:

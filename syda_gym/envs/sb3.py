@@ -43,9 +43,15 @@ class TeleopVecEnv(VecEnv):  # type: ignore[misc]
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
 
     def reset(self) -> NDArray[np.float32]:
-        """Begins an episode for every robot; seeds given by ``seed`` are used once."""
+        """Begins an episode for every robot; seeds and options given by ``seed`` and ``set_options`` are used once.
+
+        Options are of one robot each, or the same for all, as SB3 has it.
+
+        Raises:
+            SydaError: unknown options, or the environment is closed.
+        """
         seeds = [None if seed is None else int(seed) for seed in self._seeds]
-        observations, _ = self.env.reset(seed=seeds, options=dict(self._options[0]) or None)
+        observations, _ = self.env.reset(seed=seeds, options=[dict(options) for options in self._options])
         self._reset_seeds()
         self._reset_options()
         self._returns[:] = 0.0

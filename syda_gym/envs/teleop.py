@@ -178,7 +178,7 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     | ``held_out`` | ``()`` | actions that no mapping may be fitted on |
     | ``via`` | ``None`` | bodies that routes may pass; the paper's adult, kid, pepper by default |
     | ``fit_seed`` | ``0`` | seed of fits |
-    | ``reference`` | ``"paired"`` | the robot's own motion, or ``mapped``: what the mapping makes of the operator |
+    | ``reference`` | ``"auto"`` | ``paired`` (the robot's own motion) where there is one, else ``mapped`` |
     | ``action_mode`` | ``"residual"`` | or ``position`` |
     | ``residual_scale`` | ``0.25`` | correction at action 1 [rad] |
     | ``preview``, ``history`` | ``0``, ``0`` | future and past frames in the observation |
@@ -196,6 +196,9 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
 
     ``reset(options=...)`` takes ``motion`` (name or index of a clip), ``frame`` and ``route``.
 
+    A robot of which the motions hold nothing is driven by what you recorded of it (``syda-gym record``), else by the
+    unfitted mapping; a warning says which.
+
     Disturbances are off by default; ``syda_gym.envs.task.disturbances`` lists the cells (``lag``, ``noise``,
     ``latency``, ``noise+latency``, ``full``), the levels (``train``, ``test``, ``harsh``) and the single presets.
 
@@ -209,7 +212,8 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     * v0: first version.
 
     Raises:
-        OptionError: an unknown option or a value outside what is allowed; the message lists what is.
+        UnknownOptionError: an unknown option (a ``TypeError``, too); the message says which is nearest.
+        OptionError: a value outside what is allowed; the message lists what is.
         RouteError: no such route.
         MotionError: motions that cannot be read, or in which operator and robot do not occur together.
         MappingError: a mapping between other bodies.
@@ -268,7 +272,9 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
         Raises:
             OptionError: unknown options or values.
             RouteError: the route cannot be taken.
+            SydaError: the environment is closed.
         """
+        self._check_open("reset")
         super().reset(seed=seed)
         wish = wishes(self._fleet.repertoire, options, 1)
         observation, info = self._fleet.begin(self.np_random, wish[0])
@@ -286,8 +292,9 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
 
         Raises:
             OptionError: wrong shape or values that are not finite.
-            SydaError: not reset yet.
+            SydaError: not reset yet, or closed.
         """
+        self._check_open("step")
         if not self._started:
             raise SydaError("step was called before reset; call reset first")
         result = self._fleet.play(action)
@@ -303,13 +310,14 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
             or reset. ``human``: nothing; the window is kept up to date by ``reset`` and ``step``.
 
         Raises:
-            SydaError: not reset yet.
+            SydaError: not reset yet, or closed.
         """
         if self.render_mode is None:
             gymnasium.logger.warn(
                 "render() does nothing without a render mode; make the environment with render_mode='rgb_array'"
             )
             return None
+        self._check_open("render")
         if not self._started:
             raise SydaError("render was called before reset; call reset first")
         if self.render_mode == "rgb_array_list":
@@ -319,6 +327,7 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
 
     def close(self) -> None:
         """Releases physics, camera and window; harmless when repeated."""
+        self._released = True
         self._fleet.close()
         self._painter.close()
 

@@ -49,6 +49,8 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         autoreset_mode: ``next_step`` (Gymnasium's default: the step after the end of an episode resets the robot and
             ignores its action), ``same_step`` (the last observation is in ``infos["final_obs"]``), or ``disabled``
             (call ``reset(options={"reset_mask": mask})``).
+        max_episode_steps: cuts episodes off (``truncated``) after so many steps, as ``gymnasium.make`` does by a
+            wrapper; ``is_success`` then judges the steps until there.
         options: options, ``None`` for the defaults.
         **changes: single options, as in ``SydaTeleopEnv``.
 
@@ -62,18 +64,21 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         render_mode: str | None = None,
         *,
         autoreset_mode: str | AutoresetMode = "next_step",
+        max_episode_steps: int | None = None,
         options: TeleopOptions | None = None,
         **changes: Any,
     ) -> None:
-        if isinstance(num_envs, bool) or not isinstance(num_envs, int | np.integer) or num_envs < 1:
+        if not _is_whole(num_envs, 1):
             raise OptionError(f"num_envs must be a positive whole number, got {num_envs!r}")
         if render_mode not in (None, "rgb_array"):
             raise OptionError(f"render_mode={render_mode!r}: many robots render as None or 'rgb_array'")
+        if max_episode_steps is not None and not _is_whole(max_episode_steps, 1):
+            raise OptionError(f"max_episode_steps must be a positive whole number or None, got {max_episode_steps!r}")
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.options = TeleopOptions.of(options, changes)
         self.num_envs = int(num_envs)
         self.render_mode = render_mode
-        self._fleet = Fleet(self.options, self.num_envs)
+        self._fleet = Fleet(self.options, self.num_envs, max_episode_steps)
         self.metadata = {
             "render_modes": ["rgb_array"],
             "render_fps": round(self._fleet.rates.control_hz),
@@ -97,26 +102,33 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         return action_from_command(self.options, self.robot, array, self._fleet.base)
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | Sequence[dict[str, Any] | None] | None = None,
     ) -> tuple[Observations, dict[str, Any]]:
         """Begins an episode for every robot, or for those of ``options["reset_mask"]``.
 
         Args:
             seed: robot ``i`` gets ``seed + i``, or ``seed[i]``; ``None`` goes on with the random numbers at hand.
-            options: as in ``SydaTeleopEnv.reset``; ``motion`` and ``frame`` may hold one value per robot.
+            options: as in ``SydaTeleopEnv.reset``; ``motion`` and ``frame`` may hold one value per robot. Or a sequence
+                with the options of every robot.
+
+        Returns:
+            Observations and infos of all robots; the masks ``_key`` in the infos mark those that were reset.
 
         Raises:
             OptionError: unknown options or values.
             RouteError: the route cannot be taken.
+            SydaError: the environment is closed.
         """
-        given = dict(options or {})
-        mask = _mask(given.pop("reset_mask", None), self.num_envs)
+        self._check_open("reset")
+        mask, wish = self._wishes(options)
         self._seed(seed, mask)
-        wish = wishes(self._fleet.repertoire, given, self.num_envs)
         which = np.flatnonzero(mask).tolist()
         self._fleet.reset(which, [self._rngs[i] for i in which], [wish[i] for i in which])
         self._pending = self._pending & ~mask
-        return self._fleet.observe(), self._infos()
+        return self._fleet.observe(), self._infos(mask)
 
     def step(self, actions: NDArray[np.float32]) -> Result:
         """One control step of every robot.
@@ -126,8 +138,9 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
 
         Raises:
             OptionError: wrong shape or values that are not finite.
-            SydaError: not reset yet.
+            SydaError: not reset yet, or closed.
         """
+        self._check_open("step")
         if not self._rngs:
             raise SydaError("step was called before reset; call reset first")
         fleet = self._fleet
@@ -150,11 +163,13 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         """One picture per robot, ``(height, width, 3)`` uint8 each; ``None`` without a render mode."""
         if self.render_mode is None:
             return None
+        self._check_open("render")
         return tuple(self._painter.picture(self._fleet, index) for index in range(self.num_envs))
 
     def close_extras(self, **_: Any) -> None:
         """Releases physics and camera; Gymnasium calls this for an object whose constructor raised, too."""
         if hasattr(self, "_painter"):
+            self._released = True
             self._fleet.close()
             self._painter.close()
 
@@ -188,7 +203,19 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         fleet = self._fleet
         return observations, fleet.reward, fleet.terminated, fleet.truncated, infos
 
-    def _infos(self) -> dict[str, Any]:
+    def _wishes(self, options: dict[str, Any] | Sequence[dict[str, Any] | None] | None) -> tuple[Flags, Any]:
+        """Who is reset, and what is asked of each robot."""
+        repertoire, count = self._fleet.repertoire, self.num_envs
+        if options is None or isinstance(options, dict):
+            given = dict(options or {})
+            mask = _mask(given.pop("reset_mask", None), count)
+            return mask, wishes(repertoire, given, count)
+        each = list(options)
+        if len(each) != count:
+            raise OptionError(f"expected options of {count} robots, got {len(each)}")
+        return self._everyone, [wishes(repertoire, one, 1)[0] for one in each]
+
+    def _infos(self, mask: Flags | None = None) -> dict[str, Any]:
         """The fleet's info with texts looked up, and Gymnasium's mask ``_key`` beside each key."""
         infos = self._fleet.info()
         routes = self._fleet.repertoire.routes
@@ -198,7 +225,7 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         infos["motion_action"] = self._motion_actions[infos["motion_action"]]
         infos["transferability"] = trust[infos["transferability"]]
         infos["route"] = names[infos["route"]]
-        everyone = self._everyone
+        everyone = self._everyone if mask is None else mask
         infos["reward_terms"].update({f"_{name}": everyone for name in list(infos["reward_terms"])})
         infos.update({f"_{key}": everyone for key in list(infos)})
         return infos
@@ -216,6 +243,10 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         for index, value in enumerate(seeds):
             if value is not None and mask[index]:
                 self._rngs[index] = seeding.np_random(value)[0]
+
+
+def _is_whole(value: Any, least: int) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and int(value) >= least
 
 
 def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:

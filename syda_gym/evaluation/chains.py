@@ -179,11 +179,14 @@ class Links:
             fitted.update(zip(wanted, self._fit(source, target, wanted, progress), strict=True))
         return fitted[group]
 
-    def chain(self, route: Sequence[str], held_out: Sequence[str] = ()) -> Mapping:
+    def chain(self, route: Sequence[str], held_out: Sequence[str] = (), progress: Progress | None = None) -> Mapping:
         """The mapping along a route whose links have not seen the held-out actions."""
         from syda_gym.mappings.chain import ChainMapping
 
-        links = [self.link(a, b, held_out) for a, b in zip(route[:-1], route[1:], strict=True)]
+        edges = list(zip(route[:-1], route[1:], strict=True))
+        links = []
+        for place, (a, b) in enumerate(edges):
+            links.append(self.link(a, b, held_out, _part(progress, place, len(edges))))
         return links[0] if len(links) == 1 else ChainMapping(links)
 
     def count(self) -> int:
@@ -208,6 +211,11 @@ class Links:
                 training, self.method, self.preset, [self.seed] * len(training), progress=progress, **self._options
             )
         )
+
+
+def _part(progress: Progress | None, place: int, count: int) -> Progress | None:
+    """The progress of one of several equal parts."""
+    return None if progress is None else lambda fraction: progress((place + fraction) / count)
 
 
 def robots_of(motions: Motions) -> list[str]:

@@ -6,6 +6,7 @@ pixels in its bounding box, and a depth buffer keeps the nearest.
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,15 +18,14 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import OptionError
 from syda_gym.evaluation.report.figures import Shape, Track
 from syda_gym.files import atomic_path
+from syda_gym.look import GROUND, LIGHT_FROM, NIGHT_GROUND, NIGHT_SKY, SKY_TOP
 
-__all__ = ["draw", "write_png"]
+__all__ = ["draw", "png_bytes", "write_png"]
 
 Image = NDArray[np.uint8]
 
 _SPACING = 1.35  # m between bodies
-_BACKGROUND = np.array([0.955, 0.965, 0.98])
-_FLOOR = np.array([0.875, 0.895, 0.925])
-_SUN = np.array([0.55, -0.35, 0.8]) / np.linalg.norm([0.55, -0.35, 0.8])
+_SUN = np.array(LIGHT_FROM) / np.linalg.norm(LIGHT_FROM)
 
 
 def draw(
@@ -37,6 +37,7 @@ def draw(
     size: tuple[int, int] = (960, 540),
     turn: float = 0.35,
     finer: int = 2,
+    dark: bool = False,
 ) -> Image:
     """Draws bodies side by side at one frame.
 
@@ -48,6 +49,7 @@ def draw(
         size: width and height [pixels], even numbers.
         turn: how far the camera stands to the side [rad].
         finer: pixels are drawn this much finer and averaged; 1 is four times as fast and has jagged edges.
+        dark: for a dark page.
 
     Returns:
         ``(height, width, 3)`` uint8.
@@ -62,7 +64,7 @@ def draw(
     span = _SPACING * len(tracks) + 0.4
     scale = min(height / (tall + 0.25), width / span)  # pixels a metre
     camera = _camera(turn, 0.16)
-    colour = _ground(width, height, scale, camera)
+    colour = _ground(width, height, *((NIGHT_SKY, NIGHT_GROUND) if dark else (SKY_TOP, GROUND)))
     depth = np.full((height, width), -np.inf)
     for index, track in enumerate(tracks):
         shift = np.array([0.0, (index - (len(tracks) - 1) / 2) * _SPACING, 0.0])
@@ -76,7 +78,7 @@ def draw(
         for i in range(len(tracks))
     ]
     places = [(x / finer, y / finer) for x, y in places]
-    return _write_words(image, places, labels or [track.name for track in tracks], title)
+    return _write_words(image, places, labels or [track.name for track in tracks], title, dark)
 
 
 def write_png(image: Image, path: str | os.PathLike[str]) -> Path:
@@ -92,6 +94,15 @@ def write_png(image: Image, path: str | os.PathLike[str]) -> Path:
     return Path(path)
 
 
+def png_bytes(image: Image) -> bytes:
+    """The picture as the bytes of a PNG file."""
+    from PIL import Image as Pillow
+
+    buffer = io.BytesIO()
+    Pillow.fromarray(image).save(buffer, format="PNG", optimize=True)
+    return buffer.getvalue()
+
+
 def _camera(yaw: float, pitch: float) -> FloatArray:
     """Rotation from body axes (x to the viewer, y right, z up) to right, up, towards the viewer."""
     toward = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
@@ -104,11 +115,11 @@ def _pixel(point: FloatArray, width: int, height: int, scale: float) -> tuple[fl
     return width / 2 + scale * float(point[0]), height * 0.87 - scale * float(point[1])
 
 
-def _ground(width: int, height: int, scale: float, camera: FloatArray) -> FloatArray:
-    colour = np.broadcast_to(_BACKGROUND, (height, width, 3)).copy()
+def _ground(width: int, height: int, sky: Sequence[float], floor: Sequence[float]) -> FloatArray:
+    colour = np.broadcast_to(np.array(sky), (height, width, 3)).copy()
     horizon = int(height * 0.70)
     fade = np.linspace(0.0, 1.0, height - horizon)[:, None, None]
-    colour[horizon:] = _BACKGROUND + np.minimum(1.0, 2.5 * fade) * (_FLOOR - _BACKGROUND)
+    colour[horizon:] = np.array(sky) + np.minimum(1.0, 2.5 * fade) * (np.array(floor) - np.array(sky))
     return colour
 
 
@@ -251,15 +262,18 @@ def _hit_box(
 _INTERSECT = {"sphere": _hit_sphere, "cylinder": _hit_cylinder, "box": _hit_box}
 
 
-def _write_words(image: Image, places: list[tuple[float, float]], labels: Sequence[str], title: str) -> Image:
+def _write_words(
+    image: Image, places: list[tuple[float, float]], labels: Sequence[str], title: str, dark: bool
+) -> Image:
     from PIL import Image as Pillow
     from PIL import ImageDraw, ImageFont
 
     picture = Pillow.fromarray(image)
     pen = ImageDraw.Draw(picture)
+    ink = (225, 231, 240) if dark else (40, 48, 60)
     font = ImageFont.load_default(size=max(12, image.shape[0] // 32))
     for (x, y), label in zip(places, labels, strict=True):
-        pen.text((x, y + image.shape[0] // 60), label, fill=(40, 48, 60), font=font, anchor="ma")
+        pen.text((x, y + image.shape[0] // 60), label, fill=ink, font=font, anchor="ma")
     if title:
-        pen.text((image.shape[1] // 60, image.shape[0] // 40), title, fill=(40, 48, 60), font=font)
+        pen.text((image.shape[1] // 60, image.shape[0] // 40), title, fill=ink, font=font)
     return np.asarray(picture)

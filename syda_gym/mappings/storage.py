@@ -11,7 +11,7 @@ import numpy as np
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.errors import StorageError, SydaError
-from syda_gym.files import atomic_path, fingerprint, read_json, write_json
+from syda_gym.files import atomic_path, check_tensors, fingerprint, read_bytes, read_json, write_json
 from syda_gym.mappings.card import MappingCard
 from syda_gym.mappings.chain import ChainMapping
 from syda_gym.mappings.coded_mapping import CodedMapping
@@ -19,15 +19,17 @@ from syda_gym.mappings.coding import arm_coders, mink_ik, window_coder
 from syda_gym.mappings.coding.coders import Coder, restore_coder
 from syda_gym.mappings.confidence import Confidence
 from syda_gym.mappings.mapping import Mapping
-from syda_gym.mappings.models import heads, hop, linear, rotation
+from syda_gym.mappings.models import heads, hop, linear, prior, rotation
 from syda_gym.mappings.models.regressors import Regressor, restore_regressor
 
 __all__ = ["load_mapping", "save_mapping"]
 
 # Importing these enters their coders and models among those that can be rebuilt.
-_PARTS = (arm_coders, mink_ik, window_coder, heads, hop, linear, rotation)
+_PARTS = (arm_coders, mink_ik, window_coder, heads, hop, linear, prior, rotation)
 
 _MAX_BYTES = 256 * 2**20
+_MOST_LINKS = 16
+_WIDEST = 4096  # numbers of a code; models that are one affine map are written out as such, width times width
 Arrays = dict[str, FloatArray]
 
 
@@ -79,6 +81,8 @@ def load_mapping(path: str | os.PathLike[str]) -> Mapping:
     content = read_json(card)
     if not isinstance(content, dict) or not isinstance(content.get("links"), list) or not content["links"]:
         raise StorageError(f"{card}: expected the keys 'weights' and 'links'; save the mapping again")
+    if len(content["links"]) > _MOST_LINKS:
+        raise StorageError(f"{card}: a chain of {len(content['links'])} links; at most {_MOST_LINKS} are read")
     arrays = _read_arrays(weights, content.get("weights"))
     links = []
     for index, entry in enumerate(content["links"]):
@@ -88,9 +92,19 @@ def load_mapping(path: str | os.PathLike[str]) -> Mapping:
             links.append(_rebuild(entry, part, card))
         except StorageError:
             raise
-        except (SydaError, KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
+        except (
+            SydaError,
+            KeyError,
+            TypeError,
+            ValueError,
+            IndexError,
+            AttributeError,
+            ArithmeticError,
+            RecursionError,
+        ) as error:
             raise StorageError(
-                f"{card} and {weights.name} do not fit together: {error!r}; fit and save again"
+                f"{card} and {weights.name} do not fit together: {type(error).__name__}: {str(error)[:400]}; "
+                f"fit and save again"
             ) from error
     return links[0] if len(links) == 1 else ChainMapping(links)
 
@@ -135,11 +149,10 @@ def _read_arrays(path: Path, mark: Any) -> Arrays:
 
     if not path.is_file():
         raise StorageError(f"no file {path}; a mapping is a .safetensors file and a .json card beside it")
-    if path.stat().st_size > _MAX_BYTES:
-        raise StorageError(f"{path} is larger than {_MAX_BYTES >> 20} MB; that is no mapping of this library")
-    data = path.read_bytes()
+    data = read_bytes(path, _MAX_BYTES, "a mapping of this library")
     if fingerprint(data) != mark:
         raise StorageError(f"{path} does not match its card: it was changed or belongs to another mapping")
+    _check_shapes(path, check_tensors(path, "the weights of a mapping", _MAX_BYTES))
     try:
         arrays = load(data)
     except (SafetensorError, ValueError, KeyError) as error:
@@ -147,7 +160,20 @@ def _read_arrays(path: Path, mark: Any) -> Arrays:
     for name, value in arrays.items():
         if not np.issubdtype(value.dtype, np.floating) or not np.isfinite(value).all():
             raise StorageError(f"{path}: {name!r} holds values that are not finite numbers; fit and save again")
+        if name.endswith(".spread") and not (value > 0.0).all():
+            raise StorageError(f"{path}: {name!r} holds a spread that is not positive; fit and save again")
     return arrays
+
+
+def _check_shapes(path: Path, shapes: dict[str, tuple[int, ...]]) -> None:
+    """Refuses shapes that would be blown up: scales and biases are vectors, rows are no longer than a code."""
+    for name, shape in shapes.items():
+        vector = name.endswith((".mean", ".spread", "bias"))
+        if (vector and len(shape) != 1) or (shape and shape[-1] > _WIDEST) or len(shape) > 3:
+            raise StorageError(
+                f"{path}: {name[:80]!r} has shape {shape}; expected {'a vector' if vector else 'rows'} of at most "
+                f"{_WIDEST} numbers"
+            )
 
 
 def _rebuild(entry: dict[str, Any], arrays: Arrays, where: Path) -> CodedMapping:

@@ -28,7 +28,7 @@ from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.errors import MotionError, StorageError
 from syda_gym.files import read_json, write_json, write_text
 from syda_gym.motions.clip import Motions, Take
-from syda_gym.motions.readers.npz import body_from_spec, body_spec
+from syda_gym.motions.readers.own.npz import body_from_spec, body_spec
 from syda_gym.motions.readers.text import numbers, read_lines, split_row
 
 __all__ = [

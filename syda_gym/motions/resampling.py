@@ -6,9 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from syda_gym.errors import MotionError
 from syda_gym.motions.clip import Motions, Take
 
 __all__ = ["resampled"]
+
+_MOST_FRAMES = 2_000_000
 
 
 def resampled(motions: Motions, fps: float) -> Motions:
@@ -21,6 +24,9 @@ def resampled(motions: Motions, fps: float) -> Motions:
     Returns:
         New motions; a value counts as filled if either of its neighbours was. Takes that already have the rate and no
         timestamps stay as they are.
+
+    Raises:
+        MotionError: that would be millions of frames.
     """
     return replace(motions, takes=tuple(_resampled(take, fps) for take in motions.takes))
 
@@ -30,6 +36,10 @@ def _resampled(take: Take, fps: float) -> Take:
         return take
     count = len(next(iter(take.frames.values())))
     times = np.arange(count) / take.fps if take.timestamps is None else take.timestamps - take.timestamps[0]
+    if not times[-1] * fps < _MOST_FRAMES:
+        raise MotionError(
+            f"{take.recording}: {times[-1]:.3g} s at {fps:g} frames per second are more than {_MOST_FRAMES} frames"
+        )
     # A small tolerance keeps the last frame when its time is a multiple of the new period up to rounding.
     wanted = np.arange(int(np.floor(times[-1] * fps + 1e-6)) + 1) / fps
     after = np.clip(np.searchsorted(times, wanted - 1e-9), 1, max(1, count - 1))

@@ -13,11 +13,12 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.human import BONES, HumanSkeleton
 from syda_gym.errors import MotionError
 from syda_gym.files import atomic_path
+from syda_gym.look import LEFT, RIGHT
 from syda_gym.motions.clip import MotionClip
 
 __all__ = ["draw_clips"]
 
-_COLOURS = {"left": "#c44e52", "right": "#4c72b0"}
+_COLOURS = {"left": LEFT, "right": RIGHT}
 
 
 def draw_clips(

@@ -5,7 +5,8 @@ Stands above ``mappings``, because routes are rehearsed with them. ``syda_gym.tr
 """
 
 from syda_gym.routes.metric import Transferability, transferability
-from syda_gym.routes.routing import Route, best_route, ranked_routes
+from syda_gym.routes.route import Route
+from syda_gym.routes.routing import best_route, ranked_routes
 from syda_gym.routes.suggestion import spanning_pairs, suggest
 
 __all__ = [

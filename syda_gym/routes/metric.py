@@ -1,10 +1,16 @@
-"""Transferability: how well one body can stand in for another, before anything is recorded or fitted."""
+"""Transferability: how well one body can stand in for another, before anything is recorded or fitted.
+
+Three definitions give it. ``dry_run``, the default, rehearses the pair on the operator's planned motion and predicts
+the error that a fitted mapping will have. ``general`` compares workspaces term by term as the paper does, for any body;
+``paper`` reproduces the printed tables. Neither of the two predicts errors (``docs/study-transferability.md``).
+"""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -12,17 +18,38 @@ from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment, Side
 from syda_gym.embodiments.kinematics.arm_chain import ArmChain
 from syda_gym.errors import OptionError, nearest_name
+from syda_gym.motions.clip import Motions
 from syda_gym.routes import general, paper
+from syda_gym.routes.dry_run.memory import default_plan
+from syda_gym.routes.dry_run.plan import Plan, plan_from_motions
+from syda_gym.routes.dry_run.rehearsal import Rehearsal
 from syda_gym.routes.general import Sampling
 from syda_gym.routes.shipped import shipped_comparison
 from syda_gym.routes.workspace.arms import canonical_arms
 from syda_gym.routes.workspace.sampling import arm_length, chain_fingerprint, generic_rank
 from syda_gym.routes.workspace.store import MEMORY, WorkspaceStore
 
-__all__ = ["DEFINITIONS", "ArmPair", "Transferability", "compare_arms", "pair_arms", "transferability"]
+__all__ = [
+    "DEFINITIONS",
+    "OPTIONS",
+    "ArmPair",
+    "Transferability",
+    "compare_arms",
+    "pair_arms",
+    "rehearsal",
+    "rehearsed",
+    "transferability",
+]
 
-Definition = Literal["general", "paper"]
-DEFINITIONS: tuple[Definition, ...] = ("general", "paper")
+Definition = Literal["dry_run", "general", "paper"]
+DEFINITIONS: tuple[Definition, ...] = get_args(Definition)
+
+OPTIONS: dict[str, tuple[str, ...]] = {
+    "dry_run": ("motions", "plan", "sensor", "imprecision", "retargeter"),
+    "general": ("alpha", "samples", "cell", "repeats", "store"),
+    "paper": ("alpha", "store"),
+}
+"""What each definition can be told, beside the seed."""
 
 _DEVIATIONS = 2.0  # a tie is declared within two standard deviations
 
@@ -34,17 +61,19 @@ class Transferability:
     Attributes:
         source: name of the body A that leads.
         target: name of the body B that follows.
-        definition: ``general`` or ``paper``.
-        S: share of sufficient manipulability (Eq. 8), in [0, 1].
-        D: dissimilarity where manipulability lacks (Eq. 9), in [0, 1].
-        L: length ratio (Eq. 7), in (0, 1].
+        definition: ``dry_run``, ``general`` or ``paper``.
+        S: share of sufficient manipulability (Eq. 8), or of frames within the tolerance, in [0, 1].
+        D: dissimilarity where manipulability lacks (Eq. 9), or how far the other frames lie off, in [0, 1].
+        L: length ratio (Eq. 7), in (0, 1]; 1 in the dry run, whose errors are counted in arm lengths.
         alpha: noise coefficient (Eq. 10), in (0, 1].
         C: capability S + (1 - S)(1 - D), in [0, 1].
-        coverage: share of A's cells that B reaches at all, in [0, 1].
+        coverage: share of A's cells that B reaches at all, or of B's arms that A has, in [0, 1].
         T: alpha L C (Eq. 10), in [0, 1].
         noise_floor: 1 - C of A against an independent resample of itself; differences below it mean nothing.
         spread: standard deviation of T over independent samplings.
         KL: the divergence inside Eq. 9; ``None`` in the general definition, which has none.
+        error: expected landmark error on unseen actions [m]; ``dry_run`` only.
+        standard_error: of ``error``, over actions [m]; ``dry_run`` only.
         notes: what a reader should know about this pair (planar arms, missing arms, little coverage).
     """
 
@@ -62,6 +91,8 @@ class Transferability:
     spread: float = 0.0
     KL: float | None = None
     notes: tuple[str, ...] = ()
+    error: float | None = None
+    standard_error: float | None = None
 
     @property
     def tolerance(self) -> float:
@@ -69,7 +100,10 @@ class Transferability:
         return max(self.noise_floor * self.T, _DEVIATIONS * self.spread)
 
     def ties(self, other: Transferability) -> bool:
-        """Whether the two values of T cannot be told apart."""
+        """Whether the two cannot be told apart: by their expected errors where both have one, else by T."""
+        if self.error is not None and other.error is not None:
+            noise = float(np.hypot(self.standard_error or 0.0, other.standard_error or 0.0))
+            return abs(self.error - other.error) <= noise
         return abs(self.T - other.T) <= max(self.tolerance, other.tolerance)
 
     def as_dict(self) -> dict[str, Any]:
@@ -90,47 +124,113 @@ class ArmPair:
 def transferability(
     source: str | os.PathLike[str] | Embodiment,
     target: str | os.PathLike[str] | Embodiment,
-    definition: Definition = "general",
+    definition: Definition = "dry_run",
     *,
-    alpha: float | None = None,
-    samples: int = 2**20,
-    cell: float = 0.1,
     seed: int = 0,
-    repeats: int = 3,
-    store: WorkspaceStore = MEMORY,
+    **options: Any,
 ) -> Transferability:
     """Measures how well ``target`` can follow ``source`` (Eq. 10 of the paper).
 
     Args:
         source: the body A that leads: a name of the catalog, a body, or a path to a URDF or robot description.
         target: the body B that follows.
-        definition: ``general`` (any body; see ``syda_gym.routes.general``) or ``paper`` (reproduces Tables 2
-            and 5; see ``syda_gym.routes.paper`` for its limits).
-        alpha: noise coefficient in (0, 1]; by default 1, and Table 2's values in the ``paper`` definition.
-        samples: Sobol samples per arm and repeat (``general`` only), a power of two.
-        cell: edge of a cell in arm lengths (``general`` only; the paper's is 0.1).
-        seed: seed of the samples; the same seed gives the same bits.
-        repeats: independent samplings, at least 2 (``general`` only).
-        store: where sampled workspaces are kept; another than the default one samples the bundled bodies as well.
+        definition: ``dry_run`` (expected error on the operator's planned motion; see
+            ``syda_gym.routes.dry_run.rehearsal``), ``general`` (workspaces of any bodies; see
+            ``syda_gym.routes.general``) or ``paper`` (reproduces Tables 2 and 5; see ``syda_gym.routes.paper``).
+        seed: of samples, folds and noise; the same seed gives the same bits.
+        options: of the definition. ``dry_run``: ``motions`` (clips to plan beside the shipped ones: a ``Motions`` or
+            what ``load_motions`` takes), ``plan`` (a ``Plan`` instead of both), ``sensor`` (body to noise of a landmark
+            [m]), ``imprecision`` (body to arm lengths), ``retargeter`` (how robots imitate). ``general``: ``alpha``,
+            ``samples`` (a power of two), ``cell`` [arm lengths], ``repeats``, ``store``. ``paper``: ``alpha``,
+            ``store``.
 
     Returns:
-        All terms, with noise floor and spread.
+        All terms.
 
     Raises:
-        EmbodimentError: unknown or unusable body.
-        OptionError: an option out of range.
+        EmbodimentError: unknown or unusable body, or one that cannot imitate the plan.
+        RouteError: bodies without an arm on the same side (``dry_run``).
+        MotionError: motions that hold nothing to plan (``dry_run``).
+        OptionError: an option out of range or of another definition.
 
     Example:
         >>> syda_gym.transferability("adult", "pepper").T  # doctest: +SKIP
     """
     if definition not in DEFINITIONS:
         raise OptionError(f"unknown definition {definition!r}; {nearest_name(str(definition), DEFINITIONS)}")
+    for name in options:
+        if name not in OPTIONS[definition]:
+            raise OptionError(
+                f"the definition {definition!r} takes no {name!r}; {nearest_name(name, OPTIONS[definition])}"
+            )
+    alpha = options.pop("alpha", None)
     if alpha is not None and not 0.0 < alpha <= 1.0:
         raise OptionError(f"alpha is sigma_min / sigma_pair and lies in (0, 1], got {alpha}")
     a, b = catalog.resolve(source), catalog.resolve(target)
+    if definition == "dry_run":
+        return rehearsed(rehearsal({a.name: a, b.name: b}, seed=seed, **options), a.name, b.name)
+    store = options.pop("store", MEMORY)
     if definition == "paper":
         return _paper(a, b, alpha, store)
-    return _general(a, b, 1.0 if alpha is None else alpha, Sampling(samples, cell, seed, repeats), store)
+    return _general(a, b, 1.0 if alpha is None else alpha, Sampling(seed=seed, **options), store)
+
+
+def rehearsal(
+    bodies: Mapping[str, Embodiment],
+    *,
+    motions: str | os.PathLike[str] | Motions | None = None,
+    plan: Plan | None = None,
+    **options: Any,
+) -> Rehearsal:
+    """Bodies that rehearse together.
+
+    Args:
+        bodies: name to body.
+        motions: clips to plan beside the shipped ones, performed by the first of ``bodies`` that is in them, else by
+            their first body.
+        plan: what to plan instead.
+        options: of ``Rehearsal``.
+
+    Raises:
+        MotionError: motions that hold nothing to plan.
+        OptionError: both ``motions`` and ``plan``.
+    """
+    if plan is not None and motions is not None:
+        raise OptionError("give either plan= or motions=; a plan says all that is planned")
+    if plan is None:
+        plan = default_plan()
+        if motions is not None:
+            from syda_gym.motions.loading import load_motions
+
+            known = motions if isinstance(motions, Motions) else load_motions(motions)
+            performer = next((name for name in bodies if name in known.bodies), next(iter(known.bodies)))
+            plan = plan + plan_from_motions(known, performer)
+    return Rehearsal(bodies, plan, **options)
+
+
+def rehearsed(together: Rehearsal, source: str, target: str) -> Transferability:
+    """The transferability of one pair of a rehearsal."""
+    score = together.score((source, target))
+    sides = [together.bodies[name].sides for name in (source, target)]
+    carried = sum(side in sides[0] for side in sides[1]) / len(sides[1])
+    lost = f"{source!r} has not every arm of {target!r}; the missing one is guessed"
+    alone = f"only the {sides[1][0]} arm counts: {target!r} has no other"
+    return Transferability(
+        source=source,
+        target=target,
+        definition="dry_run",
+        S=score.S,
+        D=score.D,
+        L=1.0,
+        alpha=score.alpha,
+        C=score.C,
+        coverage=carried,
+        T=score.T,
+        spread=0.5 * score.standard_error / score.error * score.T,
+        notes=(*((lost,) if carried < 1.0 else ()), *((alone,) if len(sides[1]) < len(sides[0]) else ())),
+        error=score.error,
+        standard_error=score.standard_error,
+    )
 
 
 def pair_arms(source: Embodiment, target: Embodiment) -> tuple[list[ArmPair], list[str]]:

@@ -18,7 +18,8 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.routes import general, paper
 from syda_gym.routes.general import Sampling
 from syda_gym.routes.metric import Definition, Transferability, pair_arms, transferability
-from syda_gym.routes.routing import Body, BodyGraph, Route
+from syda_gym.routes.route import Route
+from syda_gym.routes.routing import Body, BodyGraph
 from syda_gym.routes.workspace.sampling import Workspace, generic_rank
 from syda_gym.routes.workspace.store import MEMORY, WorkspaceStore
 
@@ -42,6 +43,7 @@ def clouds_png(
     seed: int = 0,
     store: WorkspaceStore = MEMORY,
     width: float = 13.0,
+    dark: bool = False,
 ) -> bytes:
     """Draws where both bodies' arms move how easily, and where the target suffices, lacks or cannot reach.
 
@@ -56,7 +58,8 @@ def clouds_png(
         samples: Sobol samples per arm (``general``).
         seed: their seed.
         store: where sampled workspaces are kept.
-        width: width of the picture in inches, at 100 dots per inch.
+        width: width of the picture in inches, at 100 dots per inch; below 6 the lower row alone, for a phone.
+        dark: on a dark page.
 
     Returns:
         PNG bytes.
@@ -64,11 +67,22 @@ def clouds_png(
     Raises:
         EmbodimentError: an unusable body.
     """
-    from matplotlib.figure import Figure
+    import matplotlib
 
     a, b = _workspaces(source, target, definition, samples, seed, store)
     result = transferability(source, target, definition, store=store)
-    figure = Figure(figsize=(width, 0.66 * width), dpi=100, facecolor="white")
+    with matplotlib.rc_context(_theme(dark)):
+        return (
+            _draw_narrow(a, b, result, definition, width)
+            if width < 6.0
+            else _draw_wide(a, b, result, definition, width)
+        )
+
+
+def _draw_wide(a: Workspace, b: Workspace, result: Transferability, definition: Definition, width: float) -> bytes:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, 0.66 * width), dpi=100)
     grid = figure.add_gridspec(
         2,
         5,
@@ -105,6 +119,41 @@ def clouds_png(
     _dress_slice(flat, f"the same slice; shares of {result.source}'s workspace", definition)
     figure.suptitle(_summary(result), fontsize=11.5, y=0.97)
     return _png(figure)
+
+
+def _draw_narrow(a: Workspace, b: Workspace, result: Transferability, definition: Definition, width: float) -> bytes:
+    """The slices alone, one below the other where they need the room."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, 1.85 * width), dpi=200, layout="constrained")
+    grid = figure.add_gridspec(2, 2, height_ratios=(0.55, 1.0))
+    top = max(float(a.manipulability.max()), float(b.manipulability.max()))
+    for column, (workspace, name) in enumerate(((a, result.source), (b, result.target))):
+        axis = figure.add_subplot(grid[0, column])
+        shade = _draw_slice(axis, _slice(workspace.manipulability, workspace.present), workspace, top)
+        _dress_slice(axis, f"{name}: M", definition)
+        axis.set_xlabel("")
+        if column:
+            axis.set_ylabel("")
+    figure.colorbar(shade, ax=figure.axes, orientation="horizontal", shrink=0.8, label="manipulability M")
+    axis = figure.add_subplot(grid[1, :])
+    _draw_regions(axis, _regions(a, b), a)
+    _dress_slice(axis, f"where {result.target} can stand in for {result.source}", definition)
+    figure.suptitle(f"T = {result.T:.3f}, capability {result.C:.3f}", fontsize=10)
+    return _png(figure)
+
+
+def _theme(dark: bool) -> Any:
+    """Matplotlib's colours for a light or a dark page."""
+    if not dark:
+        return {"figure.facecolor": "white"}
+    ink, soft, card = "#e6ebf2", "#9aa7b8", "#19202a"  # as in the report's style sheet
+    names = ("text.color", "axes.labelcolor", "axes.titlecolor", "xtick.color", "ytick.color")
+    panes = {f"axes3d.{axis}axis.panecolor": (0.14, 0.18, 0.23, 0.6) for axis in "xyz"}
+    return {
+        **dict.fromkeys(names, ink), **panes, "axes.edgecolor": soft, "figure.facecolor": card, "axes.facecolor": card,
+        "savefig.facecolor": card, "legend.facecolor": card, "legend.edgecolor": soft, "grid.color": "#3a4656",
+    }  # fmt: skip
 
 
 def graph_png(
@@ -159,7 +208,10 @@ def graph_png(
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
     )  # fmt: skip
     if route is not None:
-        text = f"{' → '.join(route.bodies)}    T = {route.T:.3f} ± {route.tolerance:.3f}"
+        worth = f"T = {route.T:.3f} ± {route.tolerance:.3f}"
+        if route.error is not None and route.standard_error is not None:
+            worth = f"expected error {1000 * route.error:.0f} ± {1000 * route.standard_error:.0f} mm"
+        text = f"{' → '.join(route.bodies)}    {worth}"
         if route.ties:
             text += "\nties with " + "; ".join(" → ".join(other.bodies) for other in route.ties[:3])
         axis.set_title(text, fontsize=11)
@@ -245,7 +297,7 @@ def _draw_regions(axis: Any, regions: list[tuple[str, str, NDArray[np.bool_]]], 
 
 
 def _dress_cloud(axis: Any, title: str, definition: Definition) -> None:
-    axis.scatter([0], [0], [0], color="black", s=30)
+    axis.scatter([0], [0], [0], color=_ink(), s=30)
     labels = ("forward", "left", "up") if definition == "general" else ("right", "forward", "up")
     for set_label, label in zip((axis.set_xlabel, axis.set_ylabel, axis.set_zlabel), labels, strict=True):
         set_label(label, fontsize=8, labelpad=-12)
@@ -259,13 +311,20 @@ def _dress_cloud(axis: Any, title: str, definition: Definition) -> None:
 
 
 def _dress_slice(axis: Any, title: str, definition: Definition) -> None:
-    axis.plot(0, 0, "o", color="black", markersize=5)
+    axis.plot(0, 0, "o", color=_ink(), markersize=5)
     axis.set_xlim(-1.1, 1.1)
     axis.set_ylim(-1.1, 1.1)
     axis.set_xlabel(f"{'forward' if definition == 'general' else 'right'} [arm lengths]", fontsize=8)
     axis.set_ylabel("up [arm lengths]", fontsize=8)
     axis.tick_params(labelsize=7)
     axis.set_title(title, fontsize=10)
+
+
+def _ink() -> Any:
+    """What stands out from the page."""
+    import matplotlib
+
+    return matplotlib.rcParams["text.color"]
 
 
 def _summary(result: Transferability) -> str:

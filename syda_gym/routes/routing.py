@@ -1,29 +1,31 @@
-"""Routes: which chain of fitted pairs to take from one body to another (Eq. 11 of the paper).
+"""Routing: which chain of fitted pairs to take from one body to another.
 
-Bodies are nodes, fitted pairs are edges, and the transferability of a chain is the product along it. As every factor
-lies in [0, 1], the best chain is the shortest path on -log T and Dijkstra's algorithm finds it.
+Bodies are nodes, fitted pairs are edges. By default every simple path of up to three links is rehearsed as a whole
+(``dry_run``) and the one with the least expected error is taken. With a predictor of links the worth of a chain is the
+product along it (Eq. 11 of the paper); as every factor lies in [0, 1], the best chain is then the shortest path on
+-log T and Dijkstra's algorithm finds it.
 """
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import Any
 
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment
 from syda_gym.errors import OptionError, RouteError, nearest_name
+from syda_gym.routes.judges import PREDICTORS, LinkPredictor, carried, make_judge
 from syda_gym.routes.metric import Definition, Transferability
-from syda_gym.routes.metric import transferability as measure
+from syda_gym.routes.route import Route
 
 __all__ = [
     "PREDICTORS",
     "BodyGraph",
     "Predictor",
-    "Route",
     "best_route",
     "models_chained",
     "models_direct",
@@ -31,62 +33,10 @@ __all__ = [
 ]
 
 Body = str | os.PathLike[str] | Embodiment
-Predictor = Callable[[Transferability], float]
+Predictor = str | LinkPredictor
+"""``dry_run``, a name of ``PREDICTORS``, or a function of a link with values in [0, 1]."""
 
-PREDICTORS: dict[str, Predictor] = {
-    "T": lambda link: link.T,
-    "C": lambda link: link.C,
-    "L": lambda link: link.L,
-    "coverage": lambda link: link.coverage,
-    "arm_length_ratio": lambda link: link.L,
-    "hops": lambda link: math.exp(-1.0),
-}
-"""Scores in (0, 1] of one link; a route's score is the product. ``T`` is the paper's choice."""
-
-
-@dataclass(frozen=True)
-class Route:
-    """A chain of bodies with its transferability.
-
-    Attributes:
-        bodies: names from source to target.
-        T: product of the links' transferabilities (Eq. 11) times ``carried``.
-        links: the transferability of each link.
-        carried: share of the arms of both ends that every body on the way has; 0.5 if a one-armed body stands between
-            two-armed ones, because C is a mean over arms and nothing of the other arm arrives.
-        score: product of the predictor along the route; equals ``T`` for the predictor ``T``.
-        tolerance: half-width of the band of ``score`` in which another route counts as equal.
-        ties: other routes within the tolerance, best first (filled by ``best_route``).
-    """
-
-    bodies: tuple[str, ...]
-    T: float
-    links: tuple[Transferability, ...]
-    score: float
-    tolerance: float
-    ties: tuple[Route, ...] = ()
-    carried: float = 1.0
-
-    @property
-    def hops(self) -> int:
-        """Number of links."""
-        return len(self.links)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Everything, JSON-able."""
-        return {
-            "bodies": list(self.bodies),
-            "T": self.T,
-            "score": self.score,
-            "tolerance": self.tolerance,
-            "hops": self.hops,
-            "carried": self.carried,
-            "links": [link.as_dict() for link in self.links],
-            "ties": [list(route.bodies) for route in self.ties],
-        }
-
-    def __str__(self) -> str:
-        return f"{' -> '.join(self.bodies)} (T = {self.T:.4f})"
+_REHEARSED_HOPS = 3  # longest chain that is rehearsed unless the user says otherwise
 
 
 class BodyGraph:
@@ -95,9 +45,10 @@ class BodyGraph:
     Args:
         bodies: bodies that may stand alone, beside those of ``fitted``.
         fitted: pairs of bodies between which a mapping exists or will exist.
-        definition: ``general`` or ``paper``.
+        definition: ``dry_run`` (the default), ``general`` or ``paper``.
         directed: a pair serves from first to second only; by default both ways, as SyDa models invert.
-        predictor: what to multiply along a route: a name of ``PREDICTORS`` or a function of a link.
+        predictor: what routes are ranked by: ``dry_run``, a name of ``PREDICTORS`` or a function of a link, whose
+            values are multiplied; by default what the definition says, its T.
         alpha: noise coefficients of pairs, for example from ``noise.alpha_from_noise``; the definition's own where
             absent.
         options: options of ``transferability`` (seed, samples, ...).
@@ -111,22 +62,18 @@ class BodyGraph:
         self,
         bodies: Iterable[Body] = (),
         fitted: Iterable[tuple[Body, Body]] = (),
-        definition: Definition = "general",
+        definition: Definition | None = None,
         *,
         directed: bool = False,
-        predictor: str | Predictor = "T",
+        predictor: Predictor | None = None,
         alpha: Mapping[frozenset[str], float] | None = None,
         **options: Any,
     ) -> None:
         import networkx
 
-        self.definition = definition
         self.directed = directed
-        self._score = _predictor(predictor)
-        self._options = options
-        self._alpha = dict(alpha or {})
-        self._measured: dict[tuple[str, str], Transferability] = {}
         self.bodies: dict[str, Embodiment] = {}
+        self.judge = make_judge(self.bodies, definition, predictor, alpha, options)
         self.graph: Any = networkx.DiGraph()
         for body in bodies:
             self.add(body)
@@ -152,45 +99,19 @@ class BodyGraph:
 
     def link(self, a: str, b: str) -> Transferability:
         """Transferability from body ``a`` to body ``b``, measured once."""
-        if (a, b) not in self._measured:
-            self._measured[a, b] = measure(
-                self.bodies[a],
-                self.bodies[b],
-                self.definition,
-                alpha=self._alpha.get(frozenset((a, b))),
-                **self._options,
-            )
-        return self._measured[a, b]
+        return self.judge.link(a, b)
 
     def score(self, a: str, b: str) -> float:
-        """The predictor's value for a link, in [0, 1].
+        """What a link is worth, in [0, 1].
 
         Raises:
             OptionError: a predictor of the user returned something else.
         """
-        value = float(self._score(self.link(a, b)))
-        if not 0.0 <= value <= 1.0:
-            raise OptionError(f"a predictor must return a score in [0, 1]; for {a} to {b} it returned {value}")
-        return value
+        return self.judge.score(a, b)
 
     def route(self, names: Sequence[str]) -> Route:
         """The route along the given bodies."""
-        steps = list(zip(names[:-1], names[1:], strict=True))
-        links = tuple(self.link(a, b) for a, b in steps)
-        shared = self._shared_arms(names[0], names[-1])
-        carried = math.prod(self._carried(a, b, shared) for a, b in steps)
-        score = carried * math.prod(self.score(a, b) for a, b in steps)
-        relative = math.sqrt(sum((link.tolerance / link.T) ** 2 for link in links if link.T > 0.0))
-        product = carried * math.prod(link.T for link in links)
-        return Route(tuple(names), product, links, score, relative * score, carried=carried)
-
-    def _shared_arms(self, start: str, end: str) -> frozenset[str]:
-        return frozenset(self.bodies[start].sides) & frozenset(self.bodies[end].sides)
-
-    def _carried(self, a: str, b: str, shared: frozenset[str]) -> float:
-        """Share of the arms in question that get from ``a`` to ``b``."""
-        before = shared & frozenset(self.bodies[a].sides)
-        return len(before & frozenset(self.bodies[b].sides)) / len(before) if before else 1.0
+        return self.judge.route(names)
 
     def routes(self, source: Body, target: Body, max_hops: int | None = None) -> Iterator[Route]:
         """Routes from source to target, best first, without repeated bodies.
@@ -205,29 +126,41 @@ class BodyGraph:
             raise RouteError(f"source and target are both {start!r}; a route needs two bodies")
         if max_hops is not None and max_hops < 1:
             raise OptionError(f"max_hops must be at least 1, got {max_hops}")
+        if not networkx.has_path(self.graph, start, end):
+            raise RouteError(self._no_path(start, end, max_hops))
+        if self.judge.composed:
+            return self._rehearsed(start, end, max_hops or _REHEARSED_HOPS)
+        return self._multiplied(start, end, max_hops)
+
+    def _rehearsed(self, start: str, end: str, max_hops: int) -> Iterator[Route]:
+        """Every path within ``max_hops``, by expected error; those that cannot be judged come last."""
+        import networkx
+
+        found = [self.route(path) for path in networkx.all_simple_paths(self.graph, start, end, cutoff=max_hops)]
+        if not found:
+            raise RouteError(self._no_path(start, end, max_hops))
+        return iter(sorted(found, key=lambda route: (-route.score, route.hops, route.bodies)))
+
+    def _multiplied(self, start: str, end: str, max_hops: int | None) -> Iterator[Route]:
+        import networkx
+
         weighted = networkx.DiGraph()
         weighted.add_nodes_from(self.graph.nodes)
-        shared = self._shared_arms(start, end)
+        shared = frozenset(self.bodies[start].sides) & frozenset(self.bodies[end].sides)
         reachable = self._between(start, end, max_hops)
         for a, b in self.graph.edges:
             if a in reachable and b in reachable:
-                value = self.score(a, b) * self._carried(a, b, shared)
+                value = self.score(a, b) * carried(self.bodies, (a, b), shared)
                 if value > 0.0:
                     weighted.add_edge(a, b, weight=-math.log(value))
         if not networkx.has_path(weighted, start, end):
             raise RouteError(self._no_path(start, end, max_hops))
-        return self._simple_paths(weighted, start, end, max_hops)
-
-    def _simple_paths(self, weighted: Any, start: str, end: str, max_hops: int | None) -> Iterator[Route]:
-        import networkx
-
         if max_hops is None:  # Yen's algorithm, whose first path is Dijkstra's
-            for path in networkx.shortest_simple_paths(weighted, start, end, weight="weight"):
-                yield self.route(path)
-            return
-        paths = networkx.all_simple_paths(weighted, start, end, cutoff=max_hops)
+            paths = networkx.shortest_simple_paths(weighted, start, end, weight="weight")
+            return (self.route(path) for path in paths)
+        within = networkx.all_simple_paths(weighted, start, end, cutoff=max_hops)
         # all_simple_paths knows no weights: sort, and prefer the shorter of equal ones.
-        yield from sorted((self.route(path) for path in paths), key=lambda r: (-r.score, r.hops, r.bodies))
+        return iter(sorted((self.route(path) for path in within), key=lambda r: (-r.score, r.hops, r.bodies)))
 
     def _between(self, start: str, end: str, max_hops: int | None) -> set[str]:
         """Bodies that lie on a path short enough, so that no other link is measured."""
@@ -259,24 +192,24 @@ def best_route(
     source: Body,
     target: Body,
     fitted: Iterable[tuple[Body, Body]],
-    definition: Definition = "general",
+    definition: Definition | None = None,
     *,
     max_hops: int | None = None,
     directed: bool = False,
-    predictor: str | Predictor = "T",
+    predictor: Predictor | None = None,
     **options: Any,
 ) -> Route:
-    """The route that transferability ranks best (Eq. 11), with the routes that tie with it.
+    """The route that is expected to do best, with the routes that tie with it.
 
     Args:
         source: the operator.
         target: the robot, or any body.
         fitted: pairs of bodies with a mapping; each serves both ways unless ``directed``.
-        definition: ``general`` or ``paper``.
-        max_hops: longest chain allowed; ``None`` for any.
+        definition: ``dry_run`` (the default), ``general`` or ``paper``.
+        max_hops: longest chain allowed; by default three links in the dry run, else any.
         directed: pairs serve from first to second only.
-        predictor: what decides: a name of ``PREDICTORS`` or a function of a link with values in [0, 1].
-        options: ``alpha`` (noise coefficients of pairs) and options of ``transferability``.
+        predictor: what decides: ``dry_run``, a name of ``PREDICTORS`` or a function of a link with values in [0, 1].
+        options: of ``transferability``; ``alpha`` maps pairs to noise coefficients here.
 
     Raises:
         RouteError: no such body, no path, or none within ``max_hops``.
@@ -289,9 +222,11 @@ def best_route(
     graph = BodyGraph((), fitted, definition, directed=directed, predictor=predictor, **options)
     routes = graph.routes(source, target, max_hops)
     best = next(routes)
+    if best.note:
+        raise RouteError(f"no route from {best.bodies[0]!r} to {best.bodies[-1]!r} can be judged; {best.note}")
     ties = []
     for other in islice(routes, 100):
-        if best.score - other.score > max(best.tolerance, other.tolerance):
+        if not graph.judge.tie(best, other):
             break
         ties.append(other)
     return replace(best, ties=tuple(ties))
@@ -301,12 +236,12 @@ def ranked_routes(
     source: Body,
     target: Body,
     fitted: Iterable[tuple[Body, Body]],
-    definition: Definition = "general",
+    definition: Definition | None = None,
     *,
     count: int = 10,
     max_hops: int | None = None,
     directed: bool = False,
-    predictor: str | Predictor = "T",
+    predictor: Predictor | None = None,
     **options: Any,
 ) -> list[Route]:
     """The ``count`` best routes, best first; arguments as ``best_route``."""
@@ -329,11 +264,3 @@ def models_chained(humans: int, robots: int) -> int:
 def _check_counts(humans: int, robots: int) -> None:
     if humans < 1 or robots < 1:
         raise OptionError(f"need at least one human and one robot, got {humans} and {robots}")
-
-
-def _predictor(predictor: str | Predictor) -> Predictor:
-    if not isinstance(predictor, str):
-        return predictor
-    if predictor not in PREDICTORS:
-        raise OptionError(f"unknown predictor {predictor!r}; {nearest_name(predictor, PREDICTORS)}")
-    return PREDICTORS[predictor]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, permutations
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,8 @@ from syda_gym.routes.routing import Body, BodyGraph, Predictor
 __all__ = ["SpanningPairs", "Suggestion", "best_scores", "spanning_pairs", "suggest"]
 
 Pair = tuple[str, str]
+
+_REHEARSED_HOPS = 2  # longer chains lose more than a further pair costs, and their number explodes
 
 
 @dataclass(frozen=True)
@@ -56,23 +58,26 @@ class SpanningPairs:
 def suggest(
     bodies: Sequence[Body],
     fitted: Iterable[tuple[Body, Body]] = (),
-    definition: Definition = "general",
+    definition: Definition | None = None,
     *,
     demands: Sequence[tuple[str, str]] | None = None,
     directed: bool = False,
-    predictor: str | Predictor = "T",
+    predictor: Predictor | None = None,
     max_hops: int | None = None,
     **options: Any,
 ) -> list[Suggestion]:
     """Ranks the pairs that could be recorded next by how much the sum of best-route transferabilities rises.
 
+    In the dry run a route counts by the T of the whole of it, as rehearsed, and routes have at most ``max_hops`` links,
+    two by default.
+
     Args:
         bodies: all bodies of the lab.
         fitted: pairs that have a mapping.
-        definition: ``general`` or ``paper``.
+        definition: ``dry_run`` (the default), ``general`` or ``paper``.
         demands: ordered pairs (source, target) that matter; all by default.
         directed: a pair serves from first to second only; then both orders are tried.
-        predictor: a name of ``routing.PREDICTORS`` or a function of a link.
+        predictor: ``dry_run``, a name of ``routing.PREDICTORS`` or a function of a link.
         max_hops: longest chain that counts as a route.
         options: options of ``transferability``.
 
@@ -84,9 +89,9 @@ def suggest(
     """
     graph = BodyGraph(bodies, fitted, definition, directed=directed, predictor=predictor, **options)
     names, wanted = _names_and_demands(graph, demands)
-    links = _links(graph, names)
+    best = _best_of(graph, names, max_hops)
     fitted_mask = _fitted_mask(graph, names)
-    before = best_scores(np.where(fitted_mask, links, 0.0), max_hops)
+    before = best(fitted_mask)
     base = float(before[wanted].sum())
     result = []
     for i, j in _candidates(len(names), directed):
@@ -95,7 +100,7 @@ def suggest(
         mask = fitted_mask.copy()
         mask[i, j] = True
         mask[j, i] |= not directed
-        after = best_scores(np.where(mask, links, 0.0), max_hops)
+        after = best(mask)
         total = float(after[wanted].sum())
         new = np.argwhere(wanted & (before == 0.0) & (after > 0.0))
         connects = tuple((names[a], names[b]) for a, b in new)
@@ -106,10 +111,10 @@ def suggest(
 def spanning_pairs(
     bodies: Sequence[Body],
     fitted: Iterable[tuple[Body, Body]] = (),
-    definition: Definition = "general",
+    definition: Definition | None = None,
     *,
     demands: Sequence[tuple[str, str]] | None = None,
-    predictor: str | Predictor = "T",
+    predictor: Predictor | None = None,
     exhaustive: int = 20_000,
     **options: Any,
 ) -> SpanningPairs:
@@ -121,9 +126,9 @@ def spanning_pairs(
     Args:
         bodies: all bodies of the lab.
         fitted: pairs that have a mapping; kept.
-        definition: ``general`` or ``paper``.
+        definition: ``dry_run`` (the default), ``general`` or ``paper``.
         demands: ordered pairs that matter; all by default.
-        predictor: a name of ``routing.PREDICTORS`` or a function of a link.
+        predictor: ``dry_run``, a name of ``routing.PREDICTORS`` or a function of a link.
         exhaustive: how many sets may be tried before the exchange search is taken instead.
         options: options of ``transferability``.
 
@@ -132,7 +137,8 @@ def spanning_pairs(
     """
     graph = BodyGraph(bodies, fitted, definition, predictor=predictor, **options)
     names, wanted = _names_and_demands(graph, demands)
-    links = _links(graph, names)
+    scores = _best_of(graph, names, None)
+    links = scores(~np.eye(len(names), dtype=bool), direct=True)
     mask = _fitted_mask(graph, names)
     missing = len(_components(mask)) - 1
     free = [(i, j) for i, j in _candidates(len(names), directed=False) if not mask[i, j]]
@@ -141,7 +147,7 @@ def spanning_pairs(
         joined = mask.copy()
         for i, j in chosen:
             joined[i, j] = joined[j, i] = True
-        return float(best_scores(np.where(joined, links, 0.0))[wanted].sum())
+        return float(scores(joined)[wanted].sum())
 
     exact = math.comb(len(free), missing) <= exhaustive
     if exact:
@@ -191,8 +197,53 @@ def _names_and_demands(
     return names, wanted
 
 
-def _links(graph: BodyGraph, names: list[str]) -> FloatArray:
-    return np.array([[0.0 if a == b else graph.score(a, b) for b in names] for a in names])
+class _Products:
+    """Best product of link scores between all bodies, for any set of pairs."""
+
+    def __init__(self, graph: BodyGraph, names: list[str], max_hops: int | None) -> None:
+        self._links = np.array([[0.0 if a == b else graph.score(a, b) for b in names] for a in names])
+        self._max_hops = max_hops
+
+    def __call__(self, mask: NDArray[np.bool_], *, direct: bool = False) -> FloatArray:
+        """``(n, n)``, 0 where no route leads."""
+        links: FloatArray = np.where(mask, self._links, 0.0)
+        return links if direct else best_scores(links, self._max_hops)
+
+
+class _Rehearsed:
+    """T of the route with the least expected error between all bodies, for any set of pairs."""
+
+    def __init__(self, graph: BodyGraph, names: list[str], max_hops: int | None) -> None:
+        self._count = len(names)
+        places = range(len(names))
+        hops = max_hops or _REHEARSED_HOPS
+        self._tables = []
+        for length in range(2, min(hops + 1, len(names)) + 1):
+            routes = np.array(list(permutations(places, length)))
+            judged = [graph.route([names[place] for place in route]) for route in routes]
+            error = np.array([-route.score for route in judged])
+            value = np.array([0.0 if route.note else route.T for route in judged])
+            self._tables.append((routes, error, value))
+
+    def __call__(self, mask: NDArray[np.bool_], *, direct: bool = False) -> FloatArray:
+        """``(n, n)``, 0 where no route leads."""
+        error = np.full((self._count, self._count), np.inf)
+        best = np.zeros((self._count, self._count))
+        for routes, errors, values in self._tables[:1] if direct else self._tables:
+            steps = [mask[routes[:, k], routes[:, k + 1]] for k in range(routes.shape[1] - 1)]
+            rows = np.flatnonzero(np.logical_and.reduce(steps))
+            rows = rows[np.argsort(-errors[rows], kind="stable")]  # the least error is written last
+            ends = routes[rows, 0], routes[rows, -1]
+            least, value = np.full_like(error, np.inf), np.zeros_like(best)
+            least[ends], value[ends] = errors[rows], values[rows]
+            better = least < error
+            error, best = np.where(better, least, error), np.where(better, value, best)
+        np.fill_diagonal(best, 0.0 if direct else 1.0)
+        return best
+
+
+def _best_of(graph: BodyGraph, names: list[str], max_hops: int | None) -> _Products | _Rehearsed:
+    return (_Rehearsed if graph.judge.composed else _Products)(graph, names, max_hops)
 
 
 def _fitted_mask(graph: BodyGraph, names: list[str]) -> NDArray[np.bool_]:

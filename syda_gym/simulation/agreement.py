@@ -1,4 +1,4 @@
-"""check_agreement: whether PyBullet's landmarks are where the kinematics has them, before anything is measured there."""
+"""check_agreement: whether PyBullet's landmarks are where the kinematics has them, before anything is measured."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def check_agreement(robot: Robot, puppet: _Posed) -> None:
     worst = int(np.argmax(apart))
     if not apart[worst] <= MOST_DISAGREEMENT:
         raise EmbodimentError(
-            f"{robot.urdf.name}: in PyBullet the {robot.landmark_names[worst]} lies {1000 * apart[worst]:.1f} mm from where "
-            f"the kinematics has it; expected at most {1000 * MOST_DISAGREEMENT:.0f} mm. Please report this robot; "
-            "physics='servo' works without PyBullet"
+            f"{robot.urdf.name}: in PyBullet the {robot.landmark_names[worst]} lies {1000 * apart[worst]:.1f} mm "
+            f"from where the kinematics has it; expected at most {1000 * MOST_DISAGREEMENT:.0f} mm. Please report this "
+            "robot; physics='servo' works without PyBullet"
         )
     _agreed.add(key)
 

@@ -1,9 +1,9 @@
 """plain_body: a robot as PyBullet simulates it faithfully: one link per arm joint, all else part of what carries it.
 
 PyBullet gives a link without ``<inertial>`` one kilogram, knows no ``<mimic>``, takes 127 joints, places a root by its
-centre of mass and stops at a missing mesh. So a robot is written anew for it: the base is the body frame itself (x forward,
-y left, z up), joints that are no arm joints stand at rest, masses and inertias are summed up by pinocchio, and every
-landmark is a link of its own. A file in which nothing of this would matter is loaded as it is.
+centre of mass and stops at a missing mesh. So a robot is written anew for it: the base is the body frame itself
+(x forward, y left, z up), joints that are no arm joints stand at rest, masses and inertias are summed up by pinocchio,
+and every landmark is a link of its own. A file in which nothing of this would matter is loaded as it is.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -22,7 +22,7 @@ from syda_gym.embodiments.description import POINTS
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.kinematics.urdf import UrdfTree, configuration, placements_at, read_urdf
 from syda_gym.embodiments.reading.cleaning import origin_attributes, size_attributes
-from syda_gym.embodiments.reading.parts import Shape
+from syda_gym.embodiments.reading.parts import Joint, Shape
 from syda_gym.embodiments.robot import Robot
 
 __all__ = [
@@ -92,7 +92,7 @@ def is_plain(robot: Robot, tree: UrdfTree) -> bool:
     with_mass = tree.xml.count("<inertial>")
     plain_shapes = all(shape.kind != "mesh" for shapes in tree.shapes.values() for shape in shapes)
     plain_joints = all(
-        joint.type in ("revolute", "fixed") and joint.mimic is None and joint.name not in links
+        joint.type in ("revolute", "fixed") and _follows(joint, robot.description.rest)
         for joint in tree.joints.values()
     )
     return (
@@ -106,6 +106,14 @@ def is_plain(robot: Robot, tree: UrdfTree) -> bool:
         and not any(arm.offsets for arm in description.arms)
         and description.torso in tree.parent_joint  # a root is placed by its centre of mass
     )
+
+
+def _follows(joint: Joint, rest: Mapping[str, float]) -> bool:
+    """Whether a joint's rest angle is what its leader's asks for, so that PyBullet need not know that it follows."""
+    mimic = joint.mimic
+    if mimic is None:
+        return True
+    return abs(rest.get(joint.name, 0.0) - mimic.multiplier * rest.get(mimic.joint, 0.0) - mimic.offset) < 1e-6
 
 
 def plain_body(
@@ -269,7 +277,7 @@ class _Writer:
 
 
 def shapes_at_rest(robot: Robot, tree: UrdfTree | None = None) -> FloatArray:
-    """Corners of everything that a robot shows at rest, ``(N, 3)`` [m] in the body frame; link origins where no shape is."""
+    """Corners of everything that a robot shows at rest, ``(N, 3)`` [m] in the body frame; link origins too."""
     from syda_gym.embodiments.reading.shapes import corners
 
     tree = tree or read_urdf(robot.urdf)

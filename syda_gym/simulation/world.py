@@ -28,6 +28,7 @@ _told: set[str] = set()  # robots whose links touch at rest
 
 _HOLD_FORCE = 1e5  # N m; legs and head are no subject of the simulation and stand like a rock
 _GRAVITY = (0.0, 0.0, -9.81)
+_FIXED, _MOVING = (2, ~2), (1, -1)  # collision group and mask
 
 
 class World:
@@ -246,6 +247,8 @@ class _Puppet:
         self._hold()
         self._apply(NOMINAL)
         self._pristine: int | None = None
+        # What Bullet gives a fixed base and moving links by itself.
+        self._filters = [(-1, _FIXED), *((row[0], _MOVING) for row in rows)]
 
     def remember(self) -> None:
         """Keeps the present state of the client to return to at every reset."""
@@ -259,6 +262,19 @@ class _Puppet:
         for place, angle in zip(self._arm_places, angles, strict=True):
             q[place] = [angle]
         self._bullet.resetJointStatesMultiDof(self._body, self._movable, q, self._still, physicsClientId=self._client)
+        if self._pristine is not None:
+            self._forget_contacts()
+
+    def _forget_contacts(self) -> None:
+        """Takes every link out of the collision world and back in.
+
+        ``restoreState`` brings back positions, but Bullet keeps what it learned about pairs of links that came near:
+        contact points with their impulses and the axis that separated them last, and starts its solver from those. A
+        link that leaves takes its pairs along. Made again in the same order, they give the bits of a fresh client.
+        """
+        nothing = [(link, (0, 0)) for link, _ in self._filters]
+        for link, own in (*nothing, *self._filters):
+            self._bullet.setCollisionFilterGroupMask(self._body, link, *own, physicsClientId=self._client)
 
     def command(self, targets: list[float]) -> None:
         """Position targets of the arm joints [rad]."""

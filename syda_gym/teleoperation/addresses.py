@@ -12,15 +12,19 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MotionError, OptionError, TeleoperationError, nearest_name
 from syda_gym.motions.clip import MotionClip
 from syda_gym.motions.loading import load_motions
-from syda_gym.teleoperation.incoming.sources import ReplaySource, Source, UdpSource, WebSocketSource
+from syda_gym.teleoperation.incoming.camera import CameraSource, FilmSource
+from syda_gym.teleoperation.incoming.network import UdpSource, WebSocketSource
+from syda_gym.teleoperation.incoming.sources import ReplaySource, Source
 from syda_gym.teleoperation.outgoing.sinks import ManySinks, MemorySink, Sink, UdpSink
 
-__all__ = ["SINKS", "SOURCES", "make_sink", "make_source", "read_token"]
+__all__ = ["SINKS", "SOURCES", "host_and_port", "make_sink", "make_source", "read_token"]
 
 SOURCES = {
     "replay": "replay:SPEC plays a recording at its own speed; SPEC is embedded, format:PATH or a path",
     "udp": "udp[:HOST]:PORT listens for JSON packets",
     "ws": "ws[:HOST]:PORT serves a WebSocket for the same packets",
+    "camera": "camera[:N] follows the person in front of a camera of this machine",
+    "film": "film:FILE.mp4 follows the person in a film",
 }
 """Kinds of sources and how they are written."""
 
@@ -47,6 +51,7 @@ def make_source(
     calibration: float = 2.0,
     repeat: bool = False,
     origins: tuple[str, ...] = (),
+    model: str | os.PathLike[str] | None = None,
 ) -> Source:
     """A source from its address.
 
@@ -59,6 +64,7 @@ def make_source(
         calibration: seconds of standing that a replay begins with, for the loop's calibration.
         repeat: whether a replay begins again at its end.
         origins: web pages that may connect to a WebSocket.
+        model: file of the pose model of cameras and films; ``None`` for the default place.
 
     Raises:
         OptionError: no such kind of source, or a port that is none.
@@ -69,15 +75,30 @@ def make_source(
         clips = _clips(rest or "embedded", body, actions)
         return ReplaySource(clips, speed=speed, repeat=repeat, stand=_STAND * calibration)
     if kind == "udp":
-        host, port = _host_and_port(rest, 9870)
+        host, port = host_and_port(rest, 9870)
         return UdpSource(body, host, port, token)
     if kind == "ws":
-        host, port = _host_and_port(rest, 9871)
+        host, port = host_and_port(rest, 9871)
         return WebSocketSource(body, host, port, token, origins)
+    if kind == "camera":
+        if rest and not (rest.isascii() and rest.isdigit()):
+            raise OptionError(f"expected camera or camera:NUMBER such as camera:0, got {spec!r}")
+        return CameraSource(body, int(rest or 0), model=model)
+    if kind == "film":
+        if not rest:
+            raise OptionError("expected film:FILE such as film:wave.mp4")
+        return FilmSource(body, rest, speed=speed, repeat=repeat, stand=_STAND * calibration, model=model)
     raise OptionError(f"unknown source {spec!r}; {nearest_name(kind, SOURCES)}")
 
 
-def make_sink(specs: Sequence[str], robot: Robot, *, token: str | None = None, rate: float = 30.0) -> Sink:
+def make_sink(
+    specs: Sequence[str],
+    robot: Robot,
+    *,
+    token: str | None = None,
+    rate: float = 30.0,
+    operator: Embodiment | None = None,
+) -> Sink:
     """One sink, or several at once, from their addresses.
 
     Args:
@@ -85,11 +106,12 @@ def make_sink(specs: Sequence[str], robot: Robot, *, token: str | None = None, r
         robot: whose joints.
         token: secret that goes with UDP packets.
         rate: of a simulated robot [Hz].
+        operator: who is shown beside a simulated robot, see ``BulletSink.accompany``.
 
     Raises:
         OptionError: no such kind of sink.
     """
-    sinks = [_sink(spec, robot, token, rate) for spec in specs]
+    sinks = [_sink(spec, robot, token, rate, operator) for spec in specs]
     return sinks[0] if len(sinks) == 1 else ManySinks(sinks)
 
 
@@ -112,34 +134,38 @@ def read_token(path: str | os.PathLike[str] | None) -> str | None:
     return token
 
 
-def _sink(spec: str, robot: Robot, token: str | None, rate: float) -> Sink:
-    from syda_gym.teleoperation.outgoing.bullet import BulletSink
+def host_and_port(text: str, default: int) -> tuple[str, int]:
+    """``""``, ``PORT``, ``HOST:PORT`` or ``[IPv6]:PORT``.
 
-    kind, _, rest = spec.partition(":")
-    if kind == "none":
-        return MemorySink(limit=1)
-    if kind in ("bullet", "window"):
-        return BulletSink(robot, window=kind == "window", rate=rate)
-    if kind == "video":
-        return BulletSink(robot, video=rest or "teleoperation.mp4", rate=rate)
-    if kind == "udp":
-        host, port = _host_and_port(rest, 9880)
-        return UdpSink(robot, host, port, token)
-    if kind == "naoqi":
-        from syda_gym.teleoperation.outgoing.naoqi import NaoqiSink
-
-        return NaoqiSink(robot, rest or "tcp://127.0.0.1:9559")
-    raise OptionError(f"unknown sink {spec!r}; {nearest_name(kind, SINKS)}")
-
-
-def _host_and_port(text: str, default: int) -> tuple[str, int]:
-    """``""``, ``PORT``, ``HOST:PORT`` or ``[IPv6]:PORT``."""
+    Raises:
+        OptionError: something else.
+    """
     host, _, port = text.rpartition(":")
     if not port:
         port = str(default)
     if not port.isascii() or not port.isdigit():
         raise OptionError(f"expected HOST:PORT or PORT such as 127.0.0.1:{default}, got {text!r}")
     return host.strip("[]") or "127.0.0.1", int(port)
+
+
+def _sink(spec: str, robot: Robot, token: str | None, rate: float, operator: Embodiment | None) -> Sink:
+    from syda_gym.teleoperation.outgoing.bullet import BulletSink
+
+    kind, _, rest = spec.partition(":")
+    if kind == "none":
+        return MemorySink(limit=1)
+    if kind in ("bullet", "window"):
+        return BulletSink(robot, operator=operator, window=kind == "window", rate=rate)
+    if kind == "video":
+        return BulletSink(robot, operator=operator, video=rest or "teleoperation.mp4", rate=rate)
+    if kind == "udp":
+        host, port = host_and_port(rest, 9880)
+        return UdpSink(robot, host, port, token)
+    if kind == "naoqi":
+        from syda_gym.teleoperation.outgoing.naoqi import NaoqiSink
+
+        return NaoqiSink(robot, rest or "tcp://127.0.0.1:9559")
+    raise OptionError(f"unknown sink {spec!r}; {nearest_name(kind, SINKS)}")
 
 
 def _clips(spec: str, body: Embodiment, actions: Sequence[str]) -> list[MotionClip]:

@@ -45,6 +45,11 @@ class LiveStatistics:
         self.frames += 1
 
     @property
+    def newest_latency(self) -> float:
+        """What the latest frame took [s], NaN before the first."""
+        return float(self._latency[(self.frames - 1) % len(self._latency)]) if self.frames else float("nan")
+
+    @property
     def rate(self) -> float:
         """Commands per second over the last 64 commands; 0 before the second one."""
         count = min(self.commands, len(self._sent))

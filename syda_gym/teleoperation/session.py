@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.errors import OptionError
+from syda_gym.errors import OptionError, TeleoperationError
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.teleoperation.addresses import make_sink, make_source
 from syda_gym.teleoperation.incoming.sources import Source
@@ -17,7 +16,7 @@ from syda_gym.teleoperation.journal import Journal
 from syda_gym.teleoperation.live_run import run
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
-from syda_gym.teleoperation.outgoing.sinks import Sink
+from syda_gym.teleoperation.outgoing.sinks import ManySinks, Sink
 from syda_gym.teleoperation.tick import Decision, LoopSettings
 
 __all__ = ["Session", "teleoperate"]
@@ -44,6 +43,7 @@ def teleoperate(
     actions: Sequence[str] = (),
     repeat: bool = False,
     origins: tuple[str, ...] = (),
+    model: str | os.PathLike[str] | None = None,
     journal: str | os.PathLike[str] | None = None,
     note: dict[str, Any] | None = None,
     seconds: float | None = None,
@@ -62,6 +62,7 @@ def teleoperate(
         actions: that a replay plays.
         repeat: whether a replay begins again.
         origins: web pages that may connect to a WebSocket.
+        model: file of the pose model of cameras and films; ``None`` for the default place.
         journal: file to write every decision to.
         note: free facts for the journal.
         seconds: when to end.
@@ -82,14 +83,18 @@ def teleoperate(
         if isinstance(source, Source)
         else make_source(
             source, mapping.source, token=token, speed=speed, actions=actions, calibration=chosen.calibration,
-            repeat=repeat, origins=origins,
+            repeat=repeat, origins=origins, model=model,
         )
     )  # fmt: skip
     probe = TeleoperationLoop(mapping, chosen)
-    sink = sinks if isinstance(sinks, Sink) else make_sink(sinks, probe.robot, token=token, rate=chosen.rate)
+    sink = sinks if isinstance(sinks, Sink) else make_sink(
+        sinks, probe.robot, token=token, rate=chosen.rate, operator=mapping.source
+    )  # fmt: skip
     with sink:
-        start = _where(sink)
+        # A run begins where the robot's joints are rather than with a jump.
+        start = sink.angles()
         loop = probe if start is None else TeleoperationLoop(mapping, chosen, start)
+        _show_operator(sink, loop)
         written = None if journal is None else Journal(Path(journal), loop, note)
         stats = LiveStatistics()
         try:
@@ -101,10 +106,15 @@ def teleoperate(
                 )
         finally:
             if written is not None:
-                written.close()
+                try:
+                    written.close()
+                except TeleoperationError as error:  # the robot is home; the check of the journal will tell too
+                    loop.notices.append(str(error))
 
 
-def _where(sink: Sink) -> FloatArray | None:
-    """Where the robot's joints are now, if the sink can tell; a run begins there rather than with a jump."""
-    ask = getattr(sink, "angles", None)
-    return None if ask is None else ask()
+def _show_operator(sink: Sink, loop: TeleoperationLoop) -> None:
+    """Lets films and windows ask for the operator's frames."""
+    for each in sink.sinks if isinstance(sink, ManySinks) else (sink,):
+        accompany = getattr(each, "accompany", None)
+        if accompany is not None:
+            accompany(lambda: loop.frame)

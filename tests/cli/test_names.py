@@ -43,7 +43,7 @@ def test_everything_else():
     assert tuple(PRESETS) == names.SINGLE_DISTURBANCES
     assert names.PROTOCOLS == PROTOCOLS
     assert names.DEFINITIONS == DEFINITIONS
-    assert (*PREDICTORS, "measured") == names.PREDICTORS
+    assert ("dry_run", *PREDICTORS, "measured") == names.PREDICTORS
     assert tuple(RIVALS) == names.RIVALS
     assert set(shipped_agents()) == set(names.SHIPPED_AGENTS)
     assert set(preset_names()) == set(names.CONFIGS)

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Iterator
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -28,9 +24,6 @@ from syda_gym.evaluation.report import (
 from syda_gym.evaluation.statistics import Estimate
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-DRIVER = shutil.which("chromedriver")
 
 
 @pytest.fixture(scope="session")
@@ -121,22 +114,3 @@ _DOT = bytes.fromhex(
     "89504e470d0a1a0a0000000d4948445200000001000000010806000000" + "1f15c4890000000d49444154789c63f8ffff"
     "ff7f0009fb03fd0558e4c50000000049454e44ae426082"
 )
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    """Headless Chromium; a test that needs it is skipped, loudly, where there is none."""
-    webdriver = pytest.importorskip("selenium.webdriver", reason="no selenium: browser tests are skipped")
-    if CHROMIUM is None or DRIVER is None:
-        pytest.skip("no chromium and chromedriver on this machine: the report was not tried in a browser")
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swiftshader",
-                     "--use-angle=swiftshader", "--window-size=1200,900", "--hide-scrollbars"):  # fmt: skip
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(service=Service(DRIVER), options=options)
-    yield driver
-    driver.quit()

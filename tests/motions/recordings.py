@@ -10,8 +10,7 @@ import numpy as np
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.human import SKELETON_JOINTS, HumanSkeleton
 from syda_gym.motions import generate
-from syda_gym.motions.readers.kinect import KINECT_JOINTS
-from syda_gym.motions.readers.openni import CORNELL_JOINTS
+from syda_gym.motions.readers.layouts import CORNELL_JOINTS, KINECT_JOINTS
 
 # Columns: forward, left, up of the subject in the axes of each tool, which it faces.
 KINECT_AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])

@@ -23,7 +23,7 @@ from syda_gym.routes.workspace.store import WorkspaceStore
 # The terms are called C, L and T as in the paper, which the linter takes for constants.
 # ruff: noqa: SIM300
 
-FAST = {"samples": 2**13, "repeats": 2}
+FAST = {"definition": "general", "samples": 2**13, "repeats": 2}
 
 # source, target, C, T: the reference values at 2^20 samples and alpha = 1
 REFERENCE = [
@@ -42,7 +42,7 @@ def body(name: str) -> Embodiment:
 
 @pytest.mark.parametrize(("source", "target", "c", "t"), REFERENCE)
 def test_reference_values(source: str, target: str, c: float, t: float) -> None:
-    result = transferability(body(source), body(target))
+    result = transferability(body(source), body(target), definition="general")
     assert result.C == pytest.approx(c, abs=0.01)
     assert result.T == pytest.approx(t, abs=0.01)
     assert result.spread < 0.005
@@ -50,7 +50,7 @@ def test_reference_values(source: str, target: str, c: float, t: float) -> None:
 
 @pytest.mark.parametrize("name", ["adult", "pepper", "nao", "stiff"])
 def test_a_body_against_itself(name: str) -> None:
-    result = transferability(name, name)
+    result = transferability(name, name, definition="general")
     assert result.C == result.T == result.S == result.coverage == 1.0
     assert 1.0 - result.noise_floor >= 0.97  # against an independent resample
 
@@ -78,9 +78,12 @@ def test_same_seed_same_bits() -> None:
 
 
 def test_ties_are_declared_within_the_noise() -> None:
-    near = transferability("pepper", paper_human("adult")), transferability("pepper", paper_human("kid"))
+    near = (
+        transferability("pepper", paper_human("adult"), definition="general"),
+        transferability("pepper", paper_human("kid"), definition="general"),
+    )
     assert near[0].ties(near[1])
-    assert not near[0].ties(transferability("adult", "pepper"))
+    assert not near[0].ties(transferability("adult", "pepper", definition="general"))
 
 
 def test_one_armed_bodies_are_compared_by_their_arm() -> None:
@@ -128,7 +131,7 @@ def test_all_terms_lie_between_0_and_1_for_random_arms(seed: int, joints: int, p
     with tempfile.TemporaryDirectory() as folder:
         robot = discover_robot(_urdf(Path(folder), seed, joints, planar))
         for a, b in ((robot, catalog.get("adult")), (catalog.get("pepper"), robot), (robot, robot)):
-            result = transferability(a, b, samples=2**12, repeats=2)
+            result = transferability(a, b, samples=2**12, repeats=2, definition="general")
             for term in ("S", "D", "L", "alpha", "C", "coverage", "T", "noise_floor"):
                 assert 0.0 <= getattr(result, term) <= 1.0, term
             assert result.C == pytest.approx(result.S + (1 - result.S) * (1 - result.D))
@@ -142,7 +145,7 @@ def test_any_human_is_comparable(upper: float, fore: float, low: float, span: fl
     human = HumanSkeleton(
         "any", height=1.7, upper_arm=upper, forearm=fore, shoulders=0.3, joint_limits={"t4": (low, low + span)}
     )
-    result = transferability(human, "pepper", samples=2**12, repeats=2)
+    result = transferability(human, "pepper", samples=2**12, repeats=2, definition="general")
     assert 0.0 < result.T <= 1.0
 
 
@@ -159,13 +162,13 @@ def test_a_planar_arm_gives_a_clear_answer(tmp_path: Path) -> None:
 def test_joint_limits_that_do_not_rise_are_refused() -> None:
     human = HumanSkeleton("odd", height=1.7, upper_arm=0.3, forearm=0.3, shoulders=0.3, joint_limits={"t1": (1.0, 1.0)})
     with pytest.raises(EmbodimentError, match="rise from lower to upper"):
-        transferability(human, "adult")
+        transferability(human, "adult", definition="general")
     assert set(FULL_RANGE) == {"t1", "t2", "t3", "t4"}
 
 
 def test_unknown_bodies_are_refused() -> None:
     with pytest.raises(EmbodimentError, match="unknown embodiment 'ghost'"):
-        transferability("ghost", "adult")
+        transferability("ghost", "adult", definition="general")
 
 
 def test_the_result_is_json_able() -> None:

@@ -11,7 +11,7 @@ from syda_gym.errors import OptionError, RouteError
 from syda_gym.routes.measured import measured_bodies
 from syda_gym.routes.routing import best_route
 
-FAST = {"samples": 2**12, "repeats": 2}
+FAST = {"definition": "general", "samples": 2**12, "repeats": 2}
 LEADING = {"adult": 0.004, "kid": 0.02, "stiff": 0.001, "pepper": 0.002}
 FOLLOWING = {"adult": 0.006, "kid": 0.03, "stiff": 0.002, "pepper": 0.001}
 ERRORS = {(a, b): float(np.sqrt(LEADING[a] + FOLLOWING[b])) for a, b in permutations(LEADING, 2)}

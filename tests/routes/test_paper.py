@@ -70,8 +70,10 @@ def test_bad_options() -> None:
     with pytest.raises(OptionError, match="did you mean 'paper'"):
         transferability("adult", "kid", definition="papr")  # type: ignore[arg-type]
     with pytest.raises(OptionError, match="alpha"):
-        transferability("adult", "kid", alpha=1.5)
+        transferability("adult", "kid", "general", alpha=1.5)
     with pytest.raises(OptionError, match="power of two"):
-        transferability("adult", "kid", samples=1000)
+        transferability("adult", "kid", "general", samples=1000)
     with pytest.raises(OptionError, match="cell"):
-        transferability("adult", "kid", cell=2.0)
+        transferability("adult", "kid", "general", cell=2.0)
+    with pytest.raises(OptionError, match="takes no 'samples'"):
+        transferability("adult", "kid", samples=1000)

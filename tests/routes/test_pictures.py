@@ -11,7 +11,7 @@ from syda_gym.routes.pictures import clouds_png, graph_png
 from syda_gym.routes.routing import BodyGraph, best_route
 
 FITTED = [("adult", "kid"), ("kid", "pepper"), ("adult", "stiff"), ("stiff", "pepper")]
-FAST = {"samples": 2**13, "repeats": 2}
+FAST = {"definition": "general", "samples": 2**13, "repeats": 2}
 
 
 def pixels(png: bytes) -> np.ndarray:

@@ -19,7 +19,7 @@ from syda_gym.routes.routing import (
     ranked_routes,
 )
 
-FAST = {"samples": 2**14, "repeats": 2}
+FAST = {"definition": "general", "samples": 2**14, "repeats": 2}
 PAIRS = [("adult", "kid"), ("kid", "pepper"), ("adult", "stiff"), ("stiff", "pepper"), ("kid", "stiff")]
 
 
@@ -52,7 +52,7 @@ def test_pairs_serve_both_ways_unless_directed() -> None:
 def test_the_two_chains_of_the_paper_tie_in_the_general_definition() -> None:
     from syda_gym.routes.paper import paper_human
 
-    graph = BodyGraph([paper_human("adult"), paper_human("kid"), "pepper"])
+    graph = BodyGraph([paper_human("adult"), paper_human("kid"), "pepper"], definition="general")
     by_kid, by_adult = graph.route(("adult", "kid", "pepper")), graph.route(("kid", "adult", "pepper"))
     assert pytest.approx(0.298, abs=0.01) == by_kid.T
     assert pytest.approx(0.298, abs=0.01) == by_adult.T
@@ -126,8 +126,9 @@ class _Drawn(BodyGraph):
     """A graph whose links are given, to test routing apart from the metric."""
 
     def __init__(self, scores: dict[tuple[int, int], float]) -> None:
-        super().__init__()
+        super().__init__(definition="general")
         self._scores = scores
+        self.judge.link = self.link  # type: ignore[method-assign]
         for a, b in scores:
             for name in (str(a), str(b)):
                 self.bodies[name] = catalog.get("adult")

@@ -38,7 +38,7 @@ def test_bundled_bodies_are_not_sampled_and_other_options_are(monkeypatch):
         raise RuntimeError("sampled")
 
     monkeypatch.setattr(metric.general, "general_workspace", refuse)
-    assert transferability("kid", "nao").T > 0.0
+    assert transferability("kid", "nao", "general").T > 0.0
     for other in ({"seed": 5}, {"samples": 2**12}, {"store": WorkspaceStore()}):
         with pytest.raises(RuntimeError, match="sampled"):
-            transferability("kid", "nao", **other)
+            transferability("kid", "nao", "general", **other)

@@ -11,7 +11,7 @@ import pytest
 from syda_gym.errors import OptionError, RouteError
 from syda_gym.routes.suggestion import best_scores, spanning_pairs, suggest
 
-FAST = {"samples": 2**14, "repeats": 2}
+FAST = {"definition": "general", "samples": 2**14, "repeats": 2}
 BODIES = ("adult", "kid", "pepper", "nao", "stiff")
 
 

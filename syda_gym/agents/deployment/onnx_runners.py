@@ -12,8 +12,12 @@ from numpy.typing import ArrayLike
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import AgentError, MissingExtraError, StorageError
+from syda_gym.files import check_size, shortened
 
 __all__ = ["OnnxAgent", "OnnxRunner"]
+
+_MAX_BYTES = 256 * 2**20
+_WIDEST = 100_000
 
 
 class _Graph:
@@ -37,15 +41,28 @@ class _Graph:
         file = Path(path)
         if not file.is_file():
             raise StorageError(f"no file {file}; export an agent first")
+        check_size(file, _MAX_BYTES, "an exported agent (.onnx)")
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         options.log_severity_level = 3
         try:
             self._session = onnxruntime.InferenceSession(str(file), options, providers=["CPUExecutionProvider"])
             self.about: dict[str, Any] = json.loads(self._session.get_modelmeta().custom_metadata_map["syda_gym"])
-            self._widths = {port["name"]: int(port["shape"][1]) for port in self.about["inputs"]}
+            self._widths = {str(port["name"]): int(port["shape"][1]) for port in self.about["inputs"]}
+            if not all(0 < width <= _WIDEST for width in self._widths.values()):
+                raise ValueError(f"its card gives inputs of {shortened(list(self._widths.values()))} numbers")
         except Exception as error:  # onnxruntime raises classes of its own that it does not export
-            raise StorageError(f"{file} is no agent exported by this library: {error}") from error
+            raise StorageError(f"{file} is no agent exported by this library: {str(error)[:400]}") from error
+        needed = {self.first, "state", "fresh"}
+        if not {"state", "fresh"} <= set(self._widths):
+            raise StorageError(
+                f"{file}: its card lists the inputs {shortened(sorted(self._widths))}; expected {sorted(needed)}"
+            )
+        given = {port.name for port in self._session.get_inputs()}
+        if not set(self._widths) <= given:
+            raise StorageError(
+                f"{file}: its card lists inputs {shortened(sorted(set(self._widths) - given))} that the graph has not"
+            )
         if self.first not in self._widths:
             other = "OnnxRunner" if "frame" in self._widths else "OnnxAgent"
             raise StorageError(f"{file} begins with {next(iter(self._widths))!r}, not {self.first!r}; use {other}")

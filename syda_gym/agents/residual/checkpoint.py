@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from syda_gym.errors import StorageError
-from syda_gym.files import atomic_path
+from syda_gym.files import atomic_path, check_tensors
 
 __all__ = ["FORMAT", "load_checkpoint", "restore_model", "save_checkpoint"]
 
@@ -56,8 +56,7 @@ def load_checkpoint(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[
     file = Path(path)
     if not file.is_file():
         raise StorageError(f"no checkpoint {file}; give the folder of an earlier training, or start without resume")
-    if file.stat().st_size > _MAX_BYTES:
-        raise StorageError(f"{file} is larger than {_MAX_BYTES >> 20} MB; that is no checkpoint")
+    check_tensors(file, "a checkpoint", _MAX_BYTES)
     try:
         with safe_open(str(file), framework="pt") as content:
             tensors = {name: content.get_tensor(name) for name in content.keys()}  # noqa: SIM118 (no mapping)

@@ -30,8 +30,9 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
 
     The reward is the cost that the correction saves, in the same step, against a shadow: a robot in the same world that
     follows the base agent alone. So its mean says at once whether the policy helps. What shadows do follows from the
-    streams, and is played once before. An episode that begins in its middle begins where the shadow is. Actions are corrections in [-1, 1], low-passed and scaled as ``ResidualPolicy`` does it;
-    observations are the features of ``ResidualPolicy``, normalised. An episode ends with its clip, which is truncation.
+    streams, and is played once before. An episode that begins in its middle begins where the shadow is. Actions are
+    corrections in [-1, 1], low-passed and scaled as ``ResidualPolicy`` does it; observations are the features of
+    ``ResidualPolicy``, normalised. An episode ends with its clip, which is truncation.
 
     Args:
         base: the agent below.

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 from collections.abc import Callable, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,12 +19,14 @@ from syda_gym.agents.figures import Figures
 from syda_gym.agents.learned.policy import ResidualPolicy
 from syda_gym.agents.residual.checkpoint import load_checkpoint, restore_model, save_checkpoint
 from syda_gym.agents.residual.config import STACK, ResidualConfig
+from syda_gym.agents.residual.logs import training_logger
 from syda_gym.agents.residual.normalising import spreads
 from syda_gym.agents.stacks import build_stack, stack_arrays, stack_spec
 from syda_gym.agents.streams.ground import Ground
 from syda_gym.agents.streams.streams import Streams, score_streams
 from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.errors import OptionError, StorageError
+from syda_gym.locks import locked_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -127,18 +128,19 @@ def train_on_streams(
     progress: Progress | None = None,
 ) -> Trained:
     """The same on streams that are already recorded; see ``train_residual``."""
-    run = _Run(base, train, validation, rates, config, seed, None if folder is None else Path(folder))
-    try:
-        with _torch_and_numpy_left_alone():
-            if resume:
-                run.resume()
-            else:
-                run.begin()
-            while not run.finished:
-                run.leg(progress)
-        return run.result()
-    finally:
-        run.close()
+    with nullcontext() if folder is None else locked_folder(folder, "training") as place:
+        run = _Run(base, train, validation, rates, config, seed, place)
+        try:
+            with _torch_and_numpy_left_alone():
+                if resume:
+                    run.resume()
+                else:
+                    run.begin()
+                while not run.finished:
+                    run.leg(progress)
+            return run.result()
+        finally:
+            run.close()
 
 
 class _Run:
@@ -192,6 +194,7 @@ class _Run:
         self._normalise()
         self.model = self._new_model()
         self._judge()
+        self._store()  # so that a training that is stopped in its first leg can be resumed, too
 
     def resume(self) -> None:
         """The model and the results of a checkpoint."""
@@ -208,7 +211,7 @@ class _Run:
                 )
         self.env.mean, self.env.std = tensors.pop("mean").numpy(), tensors.pop("std").numpy()
         best = {key[5:]: tensors.pop(key).numpy() for key in list(tensors) if key.startswith("best/")}
-        self.model = self._new_model()
+        self.model = self._new_model(resumed_at=int(about["steps"]))
         restore_model(self.model, tensors, about)
         self.history = [Leg(leg["steps"], Figures(**leg["policy"]), Figures(**leg["base"])) for leg in state["history"]]
         self.snapshots = [{} for _ in self.history]
@@ -254,12 +257,12 @@ class _Run:
         features = np.concatenate(seen)
         self.env.mean, self.env.std = features.mean(axis=0), spreads(features, self.env.interface.n)
 
-    def _new_model(self) -> Any:
+    def _new_model(self, resumed_at: int | None = None) -> Any:
         from syda_gym.agents.residual.algorithms import new_model
 
         model = new_model(self.env, self.config, self.seed, lambda: self.model)
         if self.folder is not None:
-            model.set_logger(_logger(self.folder))
+            model.set_logger(training_logger(self.folder, resumed_at))
         return model
 
     def _judge(self) -> None:
@@ -273,6 +276,7 @@ class _Run:
             for name, value in figures.as_dict().items():
                 self.model.logger.record(f"validation/policy_{name}", value)
                 self.model.logger.record(f"validation/base_{name}", base.as_dict()[name])
+            self.model.logger.record("time/total_timesteps", int(self.model.num_timesteps), exclude="tensorboard")
             self.model.logger.dump(int(self.model.num_timesteps))
 
     def _score(self, agent: Agent) -> Figures:
@@ -336,16 +340,6 @@ def _callback(progress: Progress | None, total: int) -> Any:
             return True
 
     return Report()
-
-
-def _logger(folder: Path) -> Any:
-    from stable_baselines3.common.logger import configure
-
-    try:
-        importlib.import_module("tensorboard")
-    except ImportError:
-        return configure(str(folder), ["csv"])
-    return configure(str(folder), ["csv", "tensorboard"])
 
 
 @contextmanager

@@ -11,8 +11,17 @@ from syda_gym.cli import checks
 from syda_gym.cli.acting.figures import print_figures
 from syda_gym.cli.acting.scene import Scene, with_scene
 from syda_gym.cli.names import ALGORITHMS, CONFIGS, KINDS, PHYSICS, STACK, ticked
-from syda_gym.cli.options import AGENT_HELP, JsonOption, PhysicsHzOption, SeedOption
-from syda_gym.cli.shared import bar, console, print_json, say_written
+from syda_gym.cli.options import (
+    AGENT_HELP,
+    DEFAULT_VIEW,
+    AppearanceOption,
+    JsonOption,
+    PhysicsHzOption,
+    SeedOption,
+    ViewAddressOption,
+    ViewOption,
+)
+from syda_gym.cli.shared import bar, console, interruptible, print_json, say_written
 
 if TYPE_CHECKING:
     from syda_gym.agents.work import TrainingReport
@@ -79,7 +88,7 @@ def train(
             settings = (ResidualConfig.preset if config in CONFIGS else ResidualConfig.read)(config, **changes)
         else:
             settings = ResidualConfig.of({**default_config(options).as_dict(), **changes})
-    with bar("Training") as tell:
+    with interruptible(lambda: _where_to_go_on(out, kind)), bar("Training") as tell:
         report = train_agent(options, out, config=settings, base=base, seed=seed, resume=resume, progress=tell)
     rows = {}
     for place, (step, figures, below) in enumerate(report.history):
@@ -118,7 +127,7 @@ def evaluate(
         env = SydaTeleopEnv(**options)
         chosen = list(np.linspace(0, len(env.clip_names) - 1, clips).round().astype(int).tolist())
         env.close()
-    with bar("Playing") as tell:
+    with interruptible("nothing was kept; run the command again"), bar("Playing") as tell:
         results = compare_agents(options, agents, clips=chosen, draws=draws, seed=seed, progress=tell)
     count = len(next(iter(results.values())))
     means = mean_table(results)
@@ -137,6 +146,9 @@ def play(
     clip: Annotated[str, typer.Option(help="Name or number of the clip.")] = "0",
     physics_hz: PhysicsHzOption = 240.0,
     seed: SeedOption = 0,
+    view: ViewOption = False,
+    view_address: ViewAddressOption = DEFAULT_VIEW,
+    appearance: AppearanceOption = None,
     *,
     scene: Scene,
 ) -> None:
@@ -144,7 +156,17 @@ def play(
     from syda_gym.agents.work import film
 
     options = scene.options() | {"physics_hz": physics_hz}
-    with bar("Filming") as tell:
+    if view:
+        from syda_gym.agents.work import play_episode
+        from syda_gym.cli.viewing import view_episode
+
+        with bar("Playing") as tell:
+            played = play_episode(options, agent, clip=int(clip) if clip.isdigit() else clip, seed=seed)
+            tell(1.0)
+        print_figures({agent: played.figures}, f"Clip {clip}")
+        view_episode(played, f"{agent}, clip {clip}", view_address, appearance)
+        return
+    with interruptible("no film was written; run the command again"), bar("Filming") as tell:
         figures = film(options, agent, out, clip=int(clip) if clip.isdigit() else clip, seed=seed, progress=tell)
     print_figures({agent: figures}, f"Clip {clip}")
     say_written("video", out)
@@ -199,3 +221,13 @@ def _print_verdict(report: TrainingReport) -> None:
 def advice(best: str) -> str:
     """What to try after a training that gained nothing."""
     return f"more --steps, another --seed, --base stack, or take `{best}`, the best of the others, as it is"
+
+
+def _where_to_go_on(out: Path, kind: str) -> str:
+    """What an interrupted training left."""
+    if kind == "residual" and (out / "checkpoint.safetensors").is_file():
+        from syda_gym.agents.residual.checkpoint import load_checkpoint
+
+        steps = load_checkpoint(out / "checkpoint.safetensors")[1]["steps"]
+        return f"the checkpoint in {out} stands at {steps} steps; the same command with --resume goes on from there"
+    return "nothing was kept yet; run the command again"

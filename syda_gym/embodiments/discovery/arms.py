@@ -154,8 +154,8 @@ def _notes(tree: UrdfTree, arms: Sequence[ArmDescription], chosen: dict[Side, tu
     unknown = [name for name in tree.placeholders if name in used]
     if unknown:
         notes.append(
-            f"the efforts or speeds stated for {', '.join(unknown)} are placeholders that no motor has (such as 0, -1 or "
-            "1e9); taken as unknown"
+            f"the efforts or speeds stated for {', '.join(unknown)} are placeholders that no motor has (such as 0, "
+            "-1 or 1e9); taken as unknown"
         )
     return notes
 
@@ -179,13 +179,30 @@ def _sliding_above(tree: UrdfTree, joints: Sequence[str]) -> list[str]:
     return [name for name in movable_above(tree, joints[0]) if tree.joints[name].type == "prismatic"]
 
 
+def _sliding_below(tree: UrdfTree, joints: Sequence[str]) -> tuple[str, str] | None:
+    """A prismatic joint right behind an arm from which at least two turning joints go on, and the first of these."""
+    last = tree.joints[joints[-1]].child
+    for name in tree.joints:
+        if not is_movable(tree, name) or tree.joints[name].type == "prismatic":
+            continue
+        if tree.path_to(last, tree.joints[name].child) is None:
+            continue
+        above = movable_above(tree, name)
+        between = above[: above.index(joints[-1])] if joints[-1] in above else []
+        sliding = [joint for joint in between if tree.joints[joint].type == "prismatic"]
+        turning = [joint for joint in between if tree.joints[joint].type != "prismatic"]
+        if sliding and turning and between[-1] in sliding:  # a gripper's jaws turn no further joints
+            return sliding[-1], turning[-1]
+    return None
+
+
 def _prismatic_reason(tree: UrdfTree, joints: Sequence[str], chosen: dict[Side, tuple[str, ...]]) -> str:
     """Why an arm may be but a wrist: it hangs on prismatic joints, which are not driven."""
     sliding = _sliding_above(tree, joints)[::-1]
     if not sliding:
         return ""
     names = ", ".join(sliding)
-    return f". It hangs on the prismatic joints {names}, which slide and are not driven: arms here are made of turning joints"
+    return f". It hangs on the prismatic joints {names}, which slide and are not driven: arms are made of turning ones"
 
 
 def _refuse_cut_arms(tree: UrdfTree, chosen: dict[Side, tuple[str, ...]]) -> None:
@@ -194,6 +211,12 @@ def _refuse_cut_arms(tree: UrdfTree, chosen: dict[Side, tuple[str, ...]]) -> Non
         above = movable_above(tree, joints[0])
         others = {name for other, theirs in chosen.items() if other != side for name in movable_above(tree, theirs[0])}
         own = [name for name in above if name not in others] if len(chosen) > 1 else above
+        below = _sliding_below(tree, joints)
+        if below:
+            raise EmbodimentError(
+                f"{tree.path.name}: the {side} arm has the prismatic joint {below[0]!r} between {joints[-1]!r} and "
+                f"{below[1]!r}; arms are made of turning joints. Make it fixed, or name arms without it"
+            )
         slides = [name for name in own if tree.joints[name].type == "prismatic"]
         turns = [
             name
@@ -203,8 +226,9 @@ def _refuse_cut_arms(tree: UrdfTree, chosen: dict[Side, tuple[str, ...]]) -> Non
         named = [name for name in turns if kind_by_name([name, tree.joints[name].child]) == "arm"]
         if slides and (named or (len(chosen) > 1 and turns)):
             raise EmbodimentError(
-                f"{tree.path.name}: the {side} arm has the prismatic joint {slides[0]!r} between {(named or turns)[0]!r} "
-                f"and {joints[0]!r}; arms are made of turning joints. Make it fixed, or name arms without it"
+                f"{tree.path.name}: the {side} arm has the prismatic joint {slides[0]!r} between "
+                f"{(named or turns)[0]!r} and {joints[0]!r}; arms are made of turning joints. "
+                "Make it fixed, or name arms without it"
             )
 
 

@@ -224,8 +224,8 @@ def _refuse(tree: UrdfTree, arm: _Axes, elbow: int, end: ArmEnd, upper: float, f
     if end.source == "none":
         last = f"; nothing reaches beyond the last joint {arm.joints[-1]!r}: no link, no shape and no mass"
     raise EmbodimentError(
-        f"{tree.path.name}: the {arm.side} arm ({', '.join(arm.joints)}) has no upper arm and forearm: its elbow would be "
-        f"{arm.joints[elbow]!r}, with {1000 * upper:.0f} mm to the shoulder and {1000 * fore:.0f} mm to the end"
+        f"{tree.path.name}: the {arm.side} arm ({', '.join(arm.joints)}) has no upper arm and forearm: its elbow would "
+        f"be {arm.joints[elbow]!r}, with {1000 * upper:.0f} mm to the shoulder and {1000 * fore:.0f} mm to the end"
         f"{last}. {_ADVICE}"
     )
 

@@ -1,4 +1,4 @@
-"""body_axes: which way is forward, left and up, from the shoulders and from the feet, head or base where there are some.
+"""body_axes: which way is forward, left and up, from the shoulders, and from feet, head or base where there are some.
 
 Not from the arms: at a robot's zero pose they may point anywhere.
 """

@@ -13,6 +13,7 @@ import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray, Side
 from syda_gym.embodiments.kinematics.arm_chain import ArmChain
+from syda_gym.embodiments.kinematics.urdf_budget import check_urdf_tree
 from syda_gym.embodiments.reading.checking import check
 from syda_gym.embodiments.reading.cleaning import clean_urdf, model_joint_names
 from syda_gym.embodiments.reading.parts import Joint, Shape
@@ -135,6 +136,7 @@ def _read(path: str, _changed: int, _size: int) -> UrdfTree:
     import pinocchio
 
     file = Path(path)
+    check_urdf_tree(file)
     root = read_source(file)
     checked = check(root, file)
     shapes = read_shapes(checked.links, file, root)

@@ -108,7 +108,7 @@ def corners(shape: Shape) -> FloatArray:
         angles = np.linspace(0.0, 2.0 * np.pi, _RING, endpoint=False)
         ring = radius * np.stack([np.cos(angles), np.sin(angles), np.zeros(_RING)], axis=1)
         end = 0.5 * length + (radius if shape.kind == "capsule" else 0.0)
-        points = np.concatenate([ring + [0.0, 0.0, end], ring - [0.0, 0.0, end]])
+        points = np.concatenate([ring + np.array([0.0, 0.0, end]), ring - np.array([0.0, 0.0, end])])
     moved: FloatArray = points @ shape.placement[:3, :3].T + shape.placement[:3, 3]
     return moved
 

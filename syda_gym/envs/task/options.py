@@ -13,7 +13,7 @@ import numpy as np
 from syda_gym.embodiments.embodiment import Embodiment
 from syda_gym.envs.task.disturbances import Disturbances
 from syda_gym.envs.task.tracking import RewardWeights
-from syda_gym.errors import OptionError, nearest_name
+from syda_gym.errors import OptionError, UnknownOptionError, nearest_name
 from syda_gym.motions.clip import Motions
 from syda_gym.simulation.backend import BACKENDS
 from syda_gym.simulation.pictures.camera import CameraView
@@ -27,8 +27,9 @@ __all__ = ["ACTION_MODES", "REFERENCES", "STARTS", "TeleopOptions"]
 ACTION_MODES = ("residual", "position")
 """Actions are corrections of the base command, or joint angles."""
 
-REFERENCES = ("paired", "mapped")
-"""Track the robot's own paired motion, or what the mapping makes of the undisturbed operator."""
+REFERENCES = ("auto", "paired", "mapped")
+"""Track the robot's own paired motion, or what the mapping makes of the undisturbed operator; ``auto``: the first where
+operator and robot were recorded together."""
 
 STARTS = ("first", "uniform", "failures")
 """Start frame: the clip's first, any, or more often where the landmark error is large."""
@@ -54,7 +55,7 @@ class TeleopOptions:
     held_out: Sequence[str] = ()
     via: Sequence[str] | None = None
     fit_seed: int = 0
-    reference: str = "paired"
+    reference: str = "auto"
     action_mode: str = "residual"
     residual_scale: float = 0.25
     preview: int = 0
@@ -104,12 +105,15 @@ class TeleopOptions:
         """Options with some of them changed.
 
         Raises:
-            OptionError: an unknown option; the message says which is nearest.
+            UnknownOptionError: an unknown option; the message says which is nearest.
         """
         known = [field.name for field in fields(cls)]
         for name in changes:
             if name not in known:
-                raise OptionError(f"unknown option {name!r}; {nearest_name(name, known)}")
+                # In Python's words: TorchRL, for one, tries keywords and looks for this text.
+                raise UnknownOptionError(
+                    f"unknown option: got an unexpected keyword argument {name!r}; {nearest_name(name, known)}"
+                )
         values = {} if options is None else {name: getattr(options, name) for name in known}
         return cls(**{**values, **changes})
 

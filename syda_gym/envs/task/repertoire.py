@@ -7,9 +7,9 @@ passes beside the head. Base commands and mapped references therefore go through
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,6 @@ from syda_gym.errors import EmbodimentError, MappingError, MotionError, OptionEr
 from syda_gym.mappings.limits import limit_speed, step_towards
 from syda_gym.motions.clip import MotionClip, Motions, Take
 from syda_gym.motions.loading import load_motions, resampled
-from syda_gym.routes.choice import geometric_mapping
 from syda_gym.routes.pilot import Pilot, PlannedRoute
 
 __all__ = ["ClipEntry", "Repertoire"]
@@ -62,28 +61,33 @@ class Repertoire:
         motions = load_motions(options.motions, options.fps)
         self.operator = _body(motions, options.operator, "operator")
         robot = _body(motions, options.robot, "robot", needed=options.reference == "paired")
+        paired = options.reference == "paired" or (
+            options.reference == "auto" and _together(motions, self.operator.name, robot.name)
+        )
         if not isinstance(robot, Robot):
             raise EmbodimentError(f"robot={robot.name!r} is a {robot.kind}; choose a robot such as 'pepper'")
         self.robot = robot
         self._control_hz = float(options.control_hz)
-        source, target = _clips(motions, options, self.operator.name, robot.name)
+        source, target = _clips(motions, options, self.operator.name, robot.name, paired)
         self.pilot = Pilot(
             motions,
-            self.operator.name,
-            robot.name,
-            mapping=_mapping(motions, options, self.operator, robot),
+            self.operator,
+            robot,
+            mapping=options.mapping,
             preset=options.preset,
             held_out=options.held_out,
             via=options.via,
             seed=options.fit_seed,
         )
+        for notice in self.pilot.notices:
+            warnings.warn(notice, UserWarning, stacklevel=2)
         self.routes: list[PlannedRoute] = list(self.pilot.plan(options.route))
         self.clips = _entries(source)
         self.operator_rows = _padded([clip.frames for clip in source])
         self._mapped: dict[int, FloatArray] = {}
         self._targets: dict[float, FloatArray] = {}
         self.mapped_rows(0)  # now, so that a mapping that cannot be fitted says so at once
-        self._paired_rows = _padded([clip.frames for clip in target]) if options.reference == "paired" else None
+        self._paired_rows = _padded([clip.frames for clip in target]) if paired else None
 
     @property
     def longest(self) -> int:
@@ -187,8 +191,8 @@ def _body(motions: Motions, body: object, what: str, *, needed: bool = True) -> 
         return found
     if needed and what == "robot" and (isinstance(body, Embodiment) or name in catalog.names()):
         raise EmbodimentError(
-            f"robot={name!r}: {motions.name} has no motion of it; pass reference='mapped' to track what the mapping makes of "
-            "the operator"
+            f"robot={name!r}: {motions.name} has no motion of it; pass reference='mapped' to track what the mapping "
+            "makes of the operator"
         )
     if needed:
         raise EmbodimentError(
@@ -198,19 +202,15 @@ def _body(motions: Motions, body: object, what: str, *, needed: bool = True) -> 
     return catalog.resolve(body)  # type: ignore[arg-type]
 
 
-def _mapping(motions: Motions, options: TeleopOptions, operator: Embodiment, robot: Robot) -> Any:
-    """The mapping that was asked for; the unfitted one where nothing was recorded that another could be fitted on."""
-    unfitted = options.mapping == "syda" and options.preset is None  # the defaults: nothing else was asked for
-    if not unfitted or robot.name in motions.bodies or options.route != "auto":
-        return options.mapping
-    return geometric_mapping(operator, robot)
+def _together(motions: Motions, operator: str, robot: str) -> bool:
+    return any(operator in take.frames and robot in take.frames for take in motions.takes)
 
 
 def _clips(
-    motions: Motions, options: TeleopOptions, operator: str, robot: str
+    motions: Motions, options: TeleopOptions, operator: str, robot: str, paired: bool
 ) -> tuple[list[MotionClip], list[MotionClip]]:
     """The chosen clips of operator and robot at the control rate; of the robot none if it has no reference motion."""
-    bodies = [operator, robot] if options.reference == "paired" else [operator]
+    bodies = [operator, robot] if paired else [operator]
     takes = [take for take in motions.takes if all(body in take.frames for body in bodies)]
     if not takes:
         raise MotionError(
@@ -221,7 +221,7 @@ def _clips(
     used = replace(motions, takes=tuple(_only(take, bodies) for take in takes))
     used = resampled(used, float(options.control_hz))
     source = list(used.clips(operator))
-    return source, list(used.clips(robot)) if options.reference == "paired" else []
+    return source, list(used.clips(robot)) if paired else []
 
 
 def _chosen(takes: list[Take], options: TeleopOptions) -> list[Take]:

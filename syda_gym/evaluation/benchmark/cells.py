@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 from syda_gym.evaluation.benchmark.config import BenchmarkConfig, split_method
 from syda_gym.evaluation.chains import Route, name_of
+from syda_gym.evaluation.provenance import made_by
 from syda_gym.files import fingerprint
 from syda_gym.motions.clip import Motions
 
 __all__ = ["FORMAT", "Cell", "cells_of", "data_fingerprint", "efficiency_cells"]
 
 FORMAT = 1
-"""Version of stored cells and results; others are refused."""
+"""Version of stored results; others are refused."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Cell:
         draw: which random choice of actions (``efficiency`` only).
         settings: what else of the configuration decides the numbers, as JSON text.
         data: fingerprint of the motions.
+        made: fingerprint of the versions and the code that compute it (``provenance.made_by``).
     """
 
     kind: str
@@ -43,6 +46,7 @@ class Cell:
     seed: int
     settings: str
     data: str
+    made: str = ""
     actions: int = 0
     new_body: str = ""
     draw: int = 0
@@ -50,7 +54,7 @@ class Cell:
     @property
     def key(self) -> str:
         """A name for its file: 16 hex digits of all that decides its numbers."""
-        return fingerprint(json.dumps({**asdict(self), "format": FORMAT}, sort_keys=True))
+        return fingerprint(json.dumps(asdict(self), sort_keys=True))
 
     @property
     def batch(self) -> tuple[str, str, int]:
@@ -79,8 +83,8 @@ def cells_of(config: BenchmarkConfig, motions: Motions) -> list[Cell]:
     Chains that end in a human have no episodes; they are scored by the mapping alone, with the agent ``base`` and no
     disturbance. Where nothing depends on the seed, only the first one is computed: the others would be copies.
     """
-    data = data_fingerprint(motions)
-    settings = _settings(config)
+    data, made = data_fingerprint(motions), made_by()
+    settings = {agent: _settings(config, agent) for agent in (*config.agents, "base")}
     cells = []
     for method in config.methods:
         for seed in config.seeds:
@@ -89,12 +93,14 @@ def cells_of(config: BenchmarkConfig, motions: Motions) -> list[Cell]:
                 for agent in config.agents if played else ("base",):
                     for disturbance in config.disturbances if played else ("none",):
                         if seed == config.seeds[0] or _random(method, agent, disturbance):
-                            cells.append(Cell("episodes", route, method, agent, disturbance, seed, settings, data))
+                            cells.append(
+                                Cell("episodes", route, method, agent, disturbance, seed, settings[agent], data, made)
+                            )
     unique = list(dict.fromkeys(cells))
-    return [*unique, *efficiency_cells(config, data)]
+    return [*unique, *efficiency_cells(config, data, made)]
 
 
-def efficiency_cells(config: BenchmarkConfig, data: str) -> list[Cell]:
+def efficiency_cells(config: BenchmarkConfig, data: str, made: str) -> list[Cell]:
     """The cells of the sample-efficiency curve: the chain and the direct pair for every number of actions."""
     plan = config.efficiency
     if plan is None:
@@ -103,7 +109,7 @@ def efficiency_cells(config: BenchmarkConfig, data: str) -> list[Cell]:
     settings = json.dumps({"folds": config.folds, "fps": config.fps, "fit": _fit_options(config, plan.method)})
     seeds = config.seeds if _random(plan.method, "base", "none") else config.seeds[:1]
     return [
-        Cell("efficiency", route, plan.method, "base", "none", seed, settings, data, count, plan.new_body, draw)
+        Cell("efficiency", route, plan.method, "base", "none", seed, settings, data, made, count, plan.new_body, draw)
         for seed in seeds
         for draw in range(plan.draws)
         for count in plan.actions
@@ -131,13 +137,23 @@ def _random(method: str, agent: str, disturbance: str) -> bool:
     return METHODS[split_method(method)[0]].seeded or agent not in RIVALS or disturbance != "none"
 
 
-def _settings(config: BenchmarkConfig) -> str:
+def _settings(config: BenchmarkConfig, agent: str) -> str:
     names = ("folds", "fps", "physics", "self_collision", "control_hz", "success_error")
     values: dict[str, Any] = {name: getattr(config, name) for name in names}
     values["fit"] = {method: dict(config.fit.get(method, {})) for method in config.fit}
     if "residual" in config.agents:
         values["residual_steps"] = config.residual_steps
+    values |= _bundle(agent)
     return json.dumps(values, sort_keys=True)
+
+
+def _bundle(agent: str) -> dict[str, str]:
+    """What an agent's bundle holds: another one under the same name gives other numbers."""
+    base = Path(agent).with_suffix("") if Path(agent).suffix in (".json", ".safetensors") else Path(agent)
+    files = [base.with_name(f"{base.name}{suffix}") for suffix in (".json", ".safetensors")] if base.name else []
+    if not any(file.is_file() for file in files):
+        return {}
+    return {"bundle": fingerprint(*(file.read_bytes() for file in files if file.is_file()))}
 
 
 def _fit_options(config: BenchmarkConfig, method: str) -> dict[str, Any]:

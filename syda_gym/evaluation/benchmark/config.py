@@ -10,12 +10,13 @@ from typing import Any
 
 from syda_gym.errors import OptionError, StorageError, nearest_name
 from syda_gym.evaluation.chains import Route, all_routes, check_route, robots_of
+from syda_gym.files import read_yaml
 from syda_gym.motions.clip import Motions
 
 __all__ = ["BenchmarkConfig", "EfficiencyConfig", "split_method"]
 
-_MAX_BYTES = 2**20
 _MAX_SEEDS = 10_000
+_MAX_DRAWS = 1_000
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class EfficiencyConfig:
     def __post_init__(self) -> None:
         object.__setattr__(self, "chain", _route(self.chain))
         object.__setattr__(self, "actions", _whole_numbers("efficiency.actions", self.actions, 1))
-        _whole("efficiency.draws", self.draws, 1)
+        _whole("efficiency.draws", self.draws, 1, _MAX_DRAWS)
         split_method(self.method)
         if len(self.chain) < 3 or self.new_body not in (self.chain[0], self.chain[-1]):
             raise OptionError(
@@ -162,17 +163,10 @@ class BenchmarkConfig:
             StorageError: no such file, too large, or not YAML.
             OptionError: unknown keys or bad values.
         """
-        import yaml
-
         file = Path(path)
         if not file.is_file():
             raise StorageError(f"no benchmark configuration {file}; write one, see docs/benchmark.md")
-        if file.stat().st_size > _MAX_BYTES:
-            raise StorageError(f"{file} is larger than {_MAX_BYTES} bytes; expected a short YAML file")
-        try:
-            data = yaml.safe_load(file.read_text(encoding="utf-8"))
-        except (yaml.YAMLError, ValueError, RecursionError) as error:
-            raise StorageError(f"{file} is not valid YAML: {' '.join(str(error).split())}") from error
+        data = read_yaml(file, "a benchmark configuration (short YAML)")
         if not isinstance(data, dict):
             raise OptionError(f"{file}: expected keys and values, got {type(data).__name__}")
         try:
@@ -264,9 +258,11 @@ def _route(value: Any) -> Route:
     return bodies
 
 
-def _whole(what: str, value: Any, low: int) -> None:
+def _whole(what: str, value: Any, low: int, high: int | None = None) -> None:
     if isinstance(value, bool) or not isinstance(value, int) or value < low:
         raise OptionError(f"{what} must be a whole number of at least {low}, got {value!r}")
+    if high is not None and value > high:
+        raise OptionError(f"{what} must be at most {high}, got {value!r}")
 
 
 def _whole_numbers(what: str, values: Any, low: int) -> tuple[int, ...]:

@@ -12,6 +12,7 @@ from syda_gym.errors import SydaError
 from syda_gym.evaluation.benchmark.compare import compare
 from syda_gym.evaluation.benchmark.efficiency import EfficiencyCurve, efficiency_curve, models_plot
 from syda_gym.evaluation.benchmark.results import Results
+from syda_gym.evaluation.cell_files import read_cell
 from syda_gym.evaluation.report import (
     BarPlot,
     Column,
@@ -29,13 +30,11 @@ from syda_gym.evaluation.report import (
 )
 from syda_gym.evaluation.report.model import Block, Cell
 from syda_gym.evaluation.statistics import iqm, spearman
-from syda_gym.files import read_json
 from syda_gym.motions.clip import Motions
 
 __all__ = ["differences_table", "summary_table", "write_benchmark_report"]
 
 _GROUP = ("route", "method", "agent", "disturbance")
-_SAMPLES = 2**16  # of each workspace: enough to colour a graph
 _MOST_SHOWN = 250  # chains in the playback
 
 Scores = dict[tuple[str, str], float]
@@ -233,7 +232,7 @@ def _link_scores(episodes: Results, motions: Motions) -> Scores:
         for a, b in _edges(route):
             if (a, b) not in scores:
                 try:
-                    scores[a, b] = transferability(motions.bodies[a], motions.bodies[b], samples=_SAMPLES).T
+                    scores[a, b] = transferability(motions.bodies[a], motions.bodies[b]).T
                 except SydaError:
                     scores[a, b] = math.nan
     return scores
@@ -248,9 +247,9 @@ def _playback(results: Results, motions: Motions) -> Playback | None:
     several = len(results.about["config"]["methods"]) > 1
     for key in results.about["cells"]:
         path = results.folder / "cells" / f"{key}.json"
-        if len(chains) >= _MOST_SHOWN or not path.is_file():
+        stored = read_cell(path, key) if len(chains) < _MOST_SHOWN else None
+        if stored is None:
             continue
-        stored = read_json(path)
         cell = stored["cell"]
         name = (">".join(cell["route"]), cell["method"])
         if name in seen or not stored.get("shown"):

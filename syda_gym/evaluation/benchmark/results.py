@@ -7,10 +7,8 @@ import io
 import json
 import math
 import os
-import platform
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +21,7 @@ from syda_gym.evaluation.benchmark.work import COLUMNS
 from syda_gym.evaluation.statistics import Estimate, clustered_estimate, estimate
 from syda_gym.files import atomic_path, read_json, write_json, write_text
 
-__all__ = ["Results", "read_results", "versions", "write_results"]
+__all__ = ["Results", "read_results", "write_results"]
 
 _TEXT = ("kind", "route", "method", "agent", "disturbance", "motion", "action")
 _WHOLE = ("seed", "actions", "draw", "fold", "frames")
@@ -125,18 +123,6 @@ def read_results(folder: str | os.PathLike[str]) -> Results:
     rows = _read_parquet(table) if table.suffix == ".parquet" else _read_csv(table)
     timings = root / "timings.csv"
     return Results(tuple(rows), about, tuple(_read_timings(timings)) if timings.is_file() else (), root)
-
-
-def versions() -> dict[str, str]:
-    """Versions of everything that decides the numbers."""
-    packages = ("syda-gym", "numpy", "scipy", "torch", "gymnasium", "pybullet", "pin", "stable-baselines3")
-    found = {"python": platform.python_version(), "machine": platform.machine()}
-    for name in packages:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
 
 
 def _table_name(parquet: bool) -> str:

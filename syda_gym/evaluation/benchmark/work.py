@@ -18,6 +18,7 @@ from syda_gym.evaluation.benchmark.cells import Cell
 from syda_gym.evaluation.benchmark.config import split_method
 from syda_gym.evaluation.chains import Links, action_groups
 from syda_gym.evaluation.episodes import FIGURES, Recording, figures_of_all, latency, make_env, play_all
+from syda_gym.evaluation.pools import Tell, Work
 from syda_gym.evaluation.remembering import Remembering
 from syda_gym.motions.clip import Motions, PairedMotions
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from syda_gym.mappings.mapping import Mapping
     from syda_gym.simulation.capsules import CapsuleModel
 
-__all__ = ["COLUMNS", "Worker", "folds_of"]
+__all__ = ["COLUMNS", "Worker", "folds_of", "open_work"]
 
 COLUMNS = (
     "kind", "route", "method", "agent", "disturbance", "seed", "actions", "draw", "fold", "motion", "action", "frames",
@@ -41,6 +42,11 @@ _KEPT_LINKS = 4  # sets of fitted links that a worker remembers
 def folds_of(motions: Motions, folds: int | str) -> list[tuple[str, ...]]:
     """Groups of actions over the whole data set, so that fits are shared by every chain."""
     return action_groups([take.action for take in motions.takes], folds)
+
+
+def open_work(motions: Motions) -> Work:
+    """What a worker of a pool does with a cell; see ``evaluation.pools``."""
+    return Worker(motions).run
 
 
 class Worker:
@@ -58,8 +64,12 @@ class Worker:
         self._capsules: dict[str, CapsuleModel] = {}
         _single_thread()
 
-    def run(self, cell: Cell) -> dict[str, Any]:
+    def run(self, cell: Cell, tell: Tell = lambda fraction: None) -> dict[str, Any]:
         """The rows of a cell and how long things took.
+
+        Args:
+            cell: what to compute.
+            tell: told the finished fraction.
 
         Returns:
             ``rows``: dictionaries with the keys of ``COLUMNS``, numbers that are not finite as ``None``;
@@ -68,20 +78,25 @@ class Worker:
         """
         start, processor = time.perf_counter(), time.process_time()
         shown: list[dict[str, Any]] = []
-        rows, timing = self._efficiency(cell) if cell.kind == "efficiency" else self._episodes(cell, shown)
+        rows, timing = self._efficiency(cell, tell) if cell.kind == "efficiency" else self._episodes(cell, shown, tell)
         timing["seconds"] = time.perf_counter() - start
         timing["processor"] = time.process_time() - processor
         return {"cell": cell.to_dict(), "rows": rows, "timing": timing, "shown": shown}
 
-    def _episodes(self, cell: Cell, shown: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], dict[str, float]]:
+    def _episodes(
+        self, cell: Cell, shown: list[dict[str, Any]], tell: Tell
+    ) -> tuple[list[dict[str, Any]], dict[str, float]]:
         settings = json.loads(cell.settings)
         links = self._links_of(cell.method, cell.seed, settings)
         pair = self._motions.pair(cell.route[0], cell.route[-1])
         rows: list[dict[str, Any]] = []
         timing = {"fit": 0.0, "play": 0.0, "latency": 0.0}
-        for fold, group in _folds(links, pair):
+        folds = _folds(links, pair)
+        for place, (fold, group) in enumerate(folds):
+            tell(0.5 * (bool(place) + place / len(folds)))
             start = time.perf_counter()
-            mapping = links.chain(cell.route, group)
+            # The first fold fits the links of all; that may be most of the work.
+            mapping = links.chain(cell.route, group, None if place else lambda fitted: tell(0.5 * fitted))
             fitted = time.perf_counter()
             timing["fit"] += fitted - start
             if isinstance(mapping.target, Robot):
@@ -161,7 +176,7 @@ class Worker:
         }
         return train_residual(options, ResidualConfig(steps=settings["residual_steps"]), seed=cell.seed).agent
 
-    def _efficiency(self, cell: Cell) -> tuple[list[dict[str, Any]], dict[str, float]]:
+    def _efficiency(self, cell: Cell, tell: Tell) -> tuple[list[dict[str, Any]], dict[str, float]]:
         """Fits the new body's link on a few actions and everything else on all, and maps the held-out actions."""
         settings = json.loads(cell.settings)
         links = self._links_of(cell.method, cell.seed, settings)
@@ -173,9 +188,10 @@ class Worker:
         scarce = self._scarce(cell, links, edges[new], [group for _, group in folds], settings)
         timing = {"fit": time.perf_counter() - start, "play": 0.0, "latency": 0.0}
         rows: list[dict[str, Any]] = []
-        for (fold, group), few in zip(folds, scarce, strict=True):
+        for place, ((_, group), few) in enumerate(zip(folds, scarce, strict=True)):
+            tell(0.5 + 0.5 * place / len(folds))
             chain = [few if i == new else links.link(*edge, group) for i, edge in enumerate(edges)]
-            rows += _map(cell, _joined(chain), pair.only_actions(group), fold)
+            rows += _map(cell, _joined(chain), pair.only_actions(group), folds[place][0])
         return rows, timing
 
     def _scarce(

@@ -11,7 +11,7 @@ import numpy as np
 
 from syda_gym.evaluation.chains import name_of
 from syda_gym.evaluation.demo.playback import _SHOWN_HZ, _liveliest, _stride, _tracks, playback_chain
-from syda_gym.evaluation.drawing import draw, write_png
+from syda_gym.evaluation.drawing import draw, png_bytes, write_png
 from syda_gym.evaluation.report import (
     BarPlot,
     Column,
@@ -83,7 +83,11 @@ def write_demo_report(
         Section(
             "Pictures",
             [
-                Picture("Side by side", (folder / "side_by_side.png").read_bytes()),
+                Picture(
+                    "Side by side",
+                    (folder / "side_by_side.png").read_bytes(),
+                    variants=_other_pages(shown, middle, names),
+                ),
                 Picture("Film", (folder / "chains.mp4").read_bytes(), "video/mp4"),
             ],
         ),
@@ -221,8 +225,20 @@ def _regions(result: DemoResult) -> Picture:
     from syda_gym.routes.pictures import clouds_png
 
     operator = next(iter(result.chosen))
-    png = clouds_png(result.motions.bodies[operator], result.robot, samples=2**18)
-    return Picture(f"Where {result.robot.name} can move as {operator} does", png)
+    bodies = result.motions.bodies[operator], result.robot
+    png, dark = (clouds_png(*bodies, samples=2**18, dark=dark) for dark in (False, True))
+    narrow, narrow_dark = (clouds_png(*bodies, samples=2**18, width=3.5, dark=dark) for dark in (False, True))
+    variants = {"dark": dark, "narrow": narrow, "narrow-dark": narrow_dark}
+    return Picture(f"Where {result.robot.name} can move as {operator} does", png, variants=variants)
+
+
+def _other_pages(shown: Sequence[Track], frame: int, names: Sequence[str]) -> dict[str, bytes]:
+    """The bodies side by side for dark pages, and, with letters that can be read there, for phones."""
+    wide = png_bytes(draw(shown, frame, labels=names, dark=True))
+    narrow, narrow_dark = (
+        png_bytes(draw(shown, frame, size=(700, 560), labels=names, dark=dark)) for dark in (False, True)
+    )
+    return {"dark": wide, "narrow": narrow, "narrow-dark": narrow_dark}
 
 
 def _best_chain(result: DemoResult) -> ChainResult:

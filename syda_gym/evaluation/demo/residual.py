@@ -101,7 +101,7 @@ def train_and_compare(
 def _played(
     mapping: Mapping, motions: Motions, held_out: Sequence[str], name: str, agent: Agent, seed: int
 ) -> AgentResult:
-    """An environment of its own for every agent: after a contact Bullet does not start again from the same bits."""
+    """Plays the held-out actions in an environment of the agent's own."""
     from syda_gym.agents.figures import episode_figures
 
     env = make_env(mapping, motions, held_out, self_collision=True)

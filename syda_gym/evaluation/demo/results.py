@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from syda_gym.evaluation.demo.residual_result import ResidualResult
     from syda_gym.mappings.mapping import Mapping
     from syda_gym.routes.metric import Transferability
-    from syda_gym.routes.routing import Route as BestRoute
+    from syda_gym.routes.route import Route as BestRoute
 
 __all__ = ["ChainResult", "DemoResult"]
 

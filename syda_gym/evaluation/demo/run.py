@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from syda_gym.embodiments.robot import Robot
-from syda_gym.errors import OptionError, StorageError, nearest_name
+from syda_gym.errors import OptionError, nearest_name
 from syda_gym.evaluation.chains import Links, Route, action_groups, all_routes, robots_of
 from syda_gym.evaluation.demo.results import ChainResult, DemoResult
 from syda_gym.evaluation.episodes import EpisodeFigures, Recording, figures_of_all, latency, make_env, play_all
+from syda_gym.locks import locked_folder
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from syda_gym.agents.agent import Agent
     from syda_gym.mappings.mapping import Mapping
     from syda_gym.routes.metric import Transferability
-    from syda_gym.routes.routing import Route as BestRoute
+    from syda_gym.routes.route import Route as BestRoute
 
 __all__ = ["run_demo"]
 
@@ -33,7 +34,6 @@ _BODIES = ("adult", "kid", "nao", "pepper")
 """Bodies of the demo, where the motions have them: a small graph that still has several ways to go."""
 
 _FEW_ACTIONS = 12  # up to so many actions each is left out once; with more, one fifth is held out
-_SAMPLES = 2**18  # of each workspace; the spread over seeds is printed
 
 
 def run_demo(
@@ -60,9 +60,22 @@ def run_demo(
     Raises:
         SydaError: unusable motions or folder; nothing half-written stays behind.
     """
+    tell = progress or (lambda stage, done: None)
+    with locked_folder(out) as folder:
+        return _run(motions, folder, robot, seed, residual, command, tell)
+
+
+def _run(
+    motions: str | os.PathLike[str] | Motions,
+    folder: Path,
+    robot: str | None,
+    seed: int,
+    residual: bool,
+    command: str,
+    tell: Progress,
+) -> DemoResult:
     from syda_gym.evaluation.demo.report import write_demo_report
 
-    tell = progress or (lambda stage, done: None)
     clock = _Clock(tell)
     with clock("load"):
         data = load_motions(motions)
@@ -72,7 +85,6 @@ def run_demo(
         routes = all_routes(data, operators, [driven.name], 2, via=bodies)
         operators = list(dict.fromkeys(route[0] for route in routes))
         groups = _groups(data, operators[0], driven.name, seed)
-        folder = _folder(out)  # after whatever can be refused, so that a refusal leaves nothing
     with clock("transferability"):
         links, paper_links = _measure(data, routes, tell)
         products = {route: float(np.prod([links[edge].T for edge in _edges(route)])) for route in routes}
@@ -130,19 +142,6 @@ class _Clock:
             self._tell(self._stage, 1.0)
 
 
-def _folder(out: str | os.PathLike[str]) -> Path:
-    """The output folder, made and tried before minutes of work are spent."""
-    folder = Path(out)
-    probe = folder / ".writable"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise StorageError(f"cannot write into {folder}: {error.strerror}; choose another folder with --out") from error
-    return folder
-
-
 def _robot(motions: Motions, name: str | None) -> Robot:
     known = robots_of(motions)
     if not known:
@@ -191,7 +190,7 @@ def _measure(
     general, paper = {}, {}
     for done, (a, b) in enumerate(edges):
         tell("transferability", done / len(edges))
-        general[a, b] = transferability(motions.bodies[a], motions.bodies[b], samples=_SAMPLES)
+        general[a, b] = transferability(motions.bodies[a], motions.bodies[b])
         if {a, b} <= in_paper:
             paper[a, b] = transferability(a, b, "paper")
     return general, paper
@@ -203,7 +202,7 @@ def _best(motions: Motions, routes: list[Route], operator: str, robot: str) -> B
     pairs = list(dict.fromkeys(edge for route in routes for edge in _edges(route)))
     fitted = [(motions.bodies[a], motions.bodies[b]) for a, b in pairs]
     ends = motions.bodies[operator], motions.bodies[robot]
-    return best_route(*ends, fitted, max_hops=2, directed=True, samples=_SAMPLES)
+    return best_route(*ends, fitted, max_hops=2, directed=True)
 
 
 def _play_chain(

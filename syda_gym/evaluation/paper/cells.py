@@ -12,6 +12,7 @@ import numpy as np
 from syda_gym.embodiments import landmark_error
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import MappingError, MissingExtraError
+from syda_gym.evaluation.pools import Tell
 from syda_gym.mappings.fitting.fit import fit_many
 from syda_gym.mappings.fitting.held_out import Fold, Validation, fit_folds, held_out_errors
 from syda_gym.mappings.mapping import Mapping
@@ -50,7 +51,8 @@ class Contender:
 
 
 CONTENDERS = (
-    Contender("syda", "general", bounds=2, cost=4.0),
+    Contender("syda", "general", seeded=False, bounds=1, cost=2.0),
+    Contender("syda", "synergies", bounds=2, cost=4.0),
     Contender("syda", "nested", bounds=1, cost=4.0),
     Contender("syda", "accurate", bounds=1, cost=4.0),
     Contender("syda", "paper", cost=9.0),
@@ -136,8 +138,8 @@ class CellTask:
         """Relative time: leave-one-action-out has nine folds, the others three."""
         return self.contender.cost * (3.0 if self.protocol == "loao" else 1.0)
 
-    def compute(self) -> dict[str, Any] | str:
-        """The cell's figures; a missing optional dependency gives its message instead."""
+    def compute(self, tell: Tell = lambda fraction: None) -> dict[str, Any] | str:
+        """The cell's figures, or the message of a missing optional dependency; ``tell`` hears the finished fraction."""
         import torch
 
         torch.set_num_threads(1)
@@ -148,13 +150,22 @@ class CellTask:
         numbers = range(self.seeds if contender.seeded or protocol != "loao" else 1)
         try:
             folds = fit_folds(
-                pair, contender.method, contender.preset, protocol=protocol, seeds=numbers, **_options(contender)
+                pair,
+                contender.method,
+                contender.preset,
+                protocol=protocol,
+                seeds=numbers,
+                progress=lambda fitted: tell(0.6 * fitted),
+                **_options(contender),
             )
         except MissingExtraError as error:
             return str(error)
+        tell(0.6)
         scores = held_out_errors(pair, folds, protocol)
+        tell(0.7)
         chain = _chain_errors(motions, contender, protocol, human, folds, numbers)
-        bound = _bounds(pair, contender) if contender.bounds and protocol == "loao" else None
+        tell(0.8)
+        bound = _bounds(pair, contender, tell) if contender.bounds and protocol == "loao" else None
         cell = Cell(
             contender=contender.name,
             protocol=protocol,
@@ -183,10 +194,16 @@ def _options(contender: Contender) -> dict[str, Any]:
     return {} if contender.preset == "paper" else {"confidence": False}
 
 
-def _bounds(pair: PairedMotions, contender: Contender) -> Validation:
+def _bounds(pair: PairedMotions, contender: Contender, tell: Tell) -> Validation:
     """Checks the error bound: every fold holds its own training actions out once more."""
     folds = fit_folds(
-        pair, contender.method, contender.preset, protocol="loao", seeds=range(contender.bounds), back=False
+        pair,
+        contender.method,
+        contender.preset,
+        protocol="loao",
+        seeds=range(contender.bounds),
+        back=False,
+        progress=lambda fitted: tell(0.8 + 0.2 * fitted),
     )
     return held_out_errors(pair, folds, "loao")
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from syda_gym.evaluation.paper.cells import OTHER, ROBOT
 from syda_gym.evaluation.paper.few_shot import few_shot
+from syda_gym.evaluation.pools import Tell
 from syda_gym.mappings.fitting.windows import window_study
 from syda_gym.motions.loading import load_motions
 
@@ -40,12 +41,14 @@ class FewShotTask:
         """Relative time."""
         return 12.0
 
-    def compute(self) -> dict[str, Any] | str:
-        """Rows of ``few_shot.FewShotRow``."""
+    def compute(self, tell: Tell = lambda fraction: None) -> dict[str, Any] | str:
+        """Rows of ``few_shot.FewShotRow``; ``tell`` is told the finished fraction."""
         import torch
 
         torch.set_num_threads(1)
-        rows = few_shot(load_motions(self.spec), self.newcomer, OTHER[self.newcomer], ROBOT, draws=self.seeds)
+        rows = few_shot(
+            load_motions(self.spec), self.newcomer, OTHER[self.newcomer], ROBOT, draws=self.seeds, progress=tell
+        )
         return {"rows": [asdict(row) for row in rows]}
 
 
@@ -73,7 +76,7 @@ class WindowTask:
         """Relative time."""
         return 1.0
 
-    def compute(self) -> dict[str, Any] | str:
-        """Rows of ``windows.WindowRow``."""
+    def compute(self, tell: Tell = lambda fraction: None) -> dict[str, Any] | str:
+        """Rows of ``windows.WindowRow``; it takes seconds, so that ``tell`` is told nothing."""
         rows = window_study(load_motions(self.spec).pair(self.human, ROBOT), WINDOW)
         return {"rows": [asdict(row) for row in rows]}

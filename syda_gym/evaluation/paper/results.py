@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from syda_gym.evaluation.paper.cells import Cell
+from syda_gym.evaluation.pools import Tell
 
 __all__ = ["Study", "Task", "paper_transferability"]
 
@@ -21,8 +22,8 @@ class Task(Protocol):
     def cost(self) -> float:
         """Relative time."""
 
-    def compute(self) -> dict[str, Any] | str:
-        """JSON-able figures, or why there are none."""
+    def compute(self, tell: Tell) -> dict[str, Any] | str:
+        """JSON-able figures, or why there are none; ``tell`` is told the finished fraction."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,8 @@ class Study:
         cells: by contender, protocol and human.
         few_shot: newcomer to rows of ``few_shot.FewShotRow`` as dictionaries; empty in a partial study.
         windows: human to rows of ``windows.WindowRow`` as dictionaries; empty in a partial study.
-        skipped: part to the reason why it is missing.
+        skipped: part to the reason why it is missing: an optional dependency.
+        failed: part to the trace of what went wrong, or why its worker was lost; the next run tries it again.
     """
 
     data: str
@@ -44,6 +46,7 @@ class Study:
     few_shot: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     windows: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     skipped: dict[str, str] = field(default_factory=dict)
+    failed: dict[str, str] = field(default_factory=dict)
 
     def cell(self, contender: str, protocol: str, human: str) -> Cell | None:
         """One cell, ``None`` if there is none."""

@@ -8,18 +8,19 @@ interrupted study goes on where it stopped.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from typing import Any
 
-from syda_gym.errors import MotionError, OptionError, StorageError, nearest_name
+from syda_gym.errors import MotionError, OptionError, nearest_name
+from syda_gym.evaluation.cell_files import CellFiles
 from syda_gym.evaluation.paper.cells import CONTENDERS, HUMANS, ROBOT, Cell, CellTask, Contender
 from syda_gym.evaluation.paper.extras import FewShotTask, WindowTask
 from syda_gym.evaluation.paper.results import Study, Task
-from syda_gym.files import fingerprint, read_json, write_json
-from syda_gym.mappings.card import versions
+from syda_gym.evaluation.pools import Tell, make_pool, run_jobs
+from syda_gym.evaluation.provenance import made_by, versions
+from syda_gym.files import fingerprint
+from syda_gym.locks import locked_folder
 from syda_gym.motions.clip import PROTOCOLS, Motions
 from syda_gym.motions.loading import load_motions
 
@@ -28,7 +29,8 @@ __all__ = ["CONTENDERS", "Cell", "Contender", "reproduce"]
 Progress = Callable[[float, str], None]
 """Told the finished fraction and what was finished."""
 
-_FORMAT = 2
+Inside = Callable[[float, str], None]
+"""Told the finished fraction, running parts included, and the name of one that runs."""
 
 
 def reproduce(
@@ -40,6 +42,7 @@ def reproduce(
     contenders: Sequence[str] | None = None,
     workers: int = 2,
     progress: Progress | None = None,
+    inside: Inside | None = None,
 ) -> Study:
     """Runs the paper's study.
 
@@ -53,13 +56,15 @@ def reproduce(
             causal windows.
         workers: processes; each uses one thread.
         progress: told the finished fraction and the last finished part.
+        inside: told how far the running parts are.
 
     Returns:
-        The study.
+        The study. A part that went wrong, or whose worker was lost, stands under ``failed`` with the reason.
 
     Raises:
         MotionError: bodies or pairs are missing.
         OptionError: unknown protocol or contender, no seed, no worker.
+        StorageError: ``out`` cannot be written, or another process writes there.
     """
     chosen = _chosen(contenders)
     if seeds < 1 or workers < 1:
@@ -79,39 +84,77 @@ def reproduce(
     if contenders is None and "loao" in protocols:
         tasks += [kind(spec, human, seeds) for kind in (FewShotTask, WindowTask) for human in HUMANS]
     study = Study(loaded.name, seeds, {})
-    todo = []
-    for task in tasks:
-        found = _read_part(_part_path(out, mark, task, seeds)) if out is not None else None
-        if found is None or not _add(study, task, found):
-            todo.append(task)
-    done = len(tasks) - len(todo)
-    for task, result in _computed(sorted(todo, key=lambda task: -task.cost), workers):
-        done += 1
-        if isinstance(result, str):
-            study.skipped[task.name] = result
-        else:
-            _add(study, task, result)
-            if out is not None:
-                write_json(_part_path(out, mark, task, seeds), {"format": _FORMAT, "part": result})
-        if progress is not None:
-            progress(done / len(tasks), task.name)
-    if out is not None:
-        from syda_gym.evaluation.paper.report import write_study
+    with nullcontext() if out is None else locked_folder(out) as folder:
+        files = None if folder is None else _Parts(CellFiles(folder / "cells"), mark, seeds)
+        todo = [task for task in tasks if files is None or not files.take(study, task)]
+        _compute(study, tasks, todo, workers, files, progress, inside)
+        if folder is not None:
+            from syda_gym.evaluation.paper.report import write_study
 
-        write_study(study, out, versions())
+            write_study(study, folder, versions())
     return study
 
 
-def _computed(tasks: Sequence[Task], workers: int) -> Iterator[tuple[Task, dict[str, Any] | str]]:
-    """Yields tasks with their figures (or why there are none) as they finish."""
-    if workers == 1 or len(tasks) <= 1:
-        for task in tasks:
-            yield task, task.compute()
+class _Parts:
+    """The finished parts in the output folder; only those of these motions, seeds, versions and this code count."""
+
+    def __init__(self, files: CellFiles, mark: str, seeds: int) -> None:
+        self._files = files
+        self._made = f"{mark} {seeds} {made_by()}"
+
+    def take(self, study: Study, task: Task) -> bool:
+        """Puts a part that an earlier run left in its place."""
+        found = self._files.read(*self._where(task))
+        return found is not None and _add(study, task, found)
+
+    def keep(self, task: Task, part: dict[str, Any]) -> None:
+        """Stores a part."""
+        self._files.write(*self._where(task), part)
+
+    def _where(self, task: Task) -> tuple[str, str]:
+        """The name of a part's file and the key of its content."""
+        name = task.name.replace("/", "-").replace(" ", "-")
+        key = f"{task.name} {self._made}"
+        return f"{name}-{fingerprint(key)[:8]}", key
+
+
+def _compute(
+    study: Study,
+    tasks: Sequence[Task],
+    todo: Sequence[Task],
+    workers: int,
+    files: _Parts | None,
+    progress: Progress | None,
+    inside: Inside | None,
+) -> None:
+    """Computes parts in processes, the longest first, and puts them in their places."""
+    if not todo:
         return
-    with ProcessPoolExecutor(min(workers, len(tasks)), mp_context=get_context("spawn")) as pool:
-        waiting = {pool.submit(task.compute): task for task in tasks}
-        for future in as_completed(waiting):
-            yield waiting[future], future.result()
+    finished = len(tasks) - len(todo)
+
+    def told(running: dict[int, tuple[Task, float]]) -> None:
+        if inside is not None and running:
+            part = sum(fraction for _, fraction in running.values())
+            inside((finished + part) / len(tasks), next(iter(running.values()))[0].name)
+
+    pool = make_pool(min(workers, len(todo)), _open_work)
+    for task, done in run_jobs(pool, sorted(todo, key=lambda task: -task.cost), inside=told):
+        finished += 1
+        if done.failure:
+            study.failed[task.name] = done.failure
+        elif isinstance(done.result, str):
+            study.skipped[task.name] = done.result
+        else:
+            _add(study, task, done.result)
+            if files is not None:
+                files.keep(task, done.result)
+        if progress is not None:
+            progress(finished / len(tasks), task.name)
+
+
+def _open_work() -> Callable[[Task, Tell], dict[str, Any] | str]:
+    """What a worker of the pool does with a part."""
+    return lambda task, tell: task.compute(tell)
 
 
 def _add(study: Study, task: Task, part: dict[str, Any]) -> bool:
@@ -149,22 +192,3 @@ def _check(motions: Motions) -> str:
             )
     pairs = [motions.pair(*ends) for ends in (("adult", ROBOT), ("kid", ROBOT), ("adult", "kid"))]
     return fingerprint(*(pair.fingerprint for pair in pairs))
-
-
-def _part_path(out: str | os.PathLike[str], mark: str, task: Task, seeds: int) -> Path:
-    name = task.name.replace("/", "-").replace(" ", "-")
-    return Path(out) / "cells" / f"{name}-{seeds}-{mark[:8]}.json"
-
-
-def _read_part(path: Path) -> dict[str, Any] | None:
-    """A part that an earlier run left; anything unreadable is computed again, the file is only a cache."""
-    if not path.is_file():
-        return None
-    try:
-        values = read_json(path)
-    except StorageError:
-        return None
-    if not isinstance(values, dict) or values.get("format") != _FORMAT or not isinstance(values.get("part"), dict):
-        return None
-    part: dict[str, Any] = values["part"]
-    return part

@@ -199,7 +199,9 @@ def motion_noise(motions: Motions, names: Sequence[str] | None = None) -> dict[s
 def _links(bodies: dict[str, Embodiment], samples: int, seed: int) -> dict[str, dict[tuple[str, str], Transferability]]:
     ends = list(permutations(bodies, 2))
     return {
-        "general": {(a, b): transferability(bodies[a], bodies[b], samples=samples, seed=seed) for a, b in ends},
+        "general": {
+            (a, b): transferability(bodies[a], bodies[b], "general", samples=samples, seed=seed) for a, b in ends
+        },
         "paper": {(a, b): transferability(bodies[a], bodies[b], "paper") for a, b in ends},
     }
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from syda_gym.evaluation.prediction.results import PredictionStudy
 from syda_gym.evaluation.report.model import Cell, Column, Table
 from syda_gym.routes.metric import Transferability
-from syda_gym.routes.routing import Route
+from syda_gym.routes.route import Route
 from syda_gym.routes.suggestion import SpanningPairs, Suggestion
 
 __all__ = ["links_table", "prediction_table", "routes_table", "suggestions_table"]
@@ -15,6 +15,8 @@ __all__ = ["links_table", "prediction_table", "routes_table", "suggestions_table
 
 def links_table(links: Sequence[Transferability]) -> Table:
     """Every term of every pair, with its tie band and notes."""
+    if links[0].definition == "dry_run":
+        return _rehearsed_table(links)
     columns = [
         Column("A to B"),
         Column("T", tip="alpha L C (Eq. 10)"),
@@ -35,8 +37,34 @@ def links_table(links: Sequence[Transferability]) -> Table:
     return Table(f"Transferability, {links[0].definition} definition", columns, rows, "\n".join(notes))
 
 
+def _rehearsed_table(links: Sequence[Transferability]) -> Table:
+    columns = [
+        Column("A to B"),
+        Column("expected error [mm]", digits=1, tip="on actions that no fit has seen"),
+        Column("±", digits=1, tip="standard error over actions"),
+        Column("T", tip="alpha C (Eq. 10 in arm lengths)"),
+        Column("C", tip="S + (1 - S)(1 - D)"),
+        Column("S", tip="share of frames within a tenth of the arm's length (the form of Eq. 8)"),
+        Column("1-D", tip="how near the other frames come (the form of Eq. 9)"),
+        Column("alpha", digits=2, tip="what noise and imprecision leave of C"),
+    ]
+    rows: list[list[Cell]] = [
+        [
+            f"{t.source} > {t.target}", 1000.0 * (t.error or 0.0), 1000.0 * (t.standard_error or 0.0), t.T, t.C, t.S,
+            1.0 - t.D, t.alpha,
+        ]
+        for t in links
+    ]  # fmt: skip
+    notes = dict.fromkeys(f"{t.source} > {t.target}: {note}" for t in links for note in t.notes)
+    return Table("Transferability, rehearsed (dry run)", columns, rows, "\n".join(notes))
+
+
 def routes_table(routes: Sequence[Route], predictor: str = "T") -> Table:
-    """Routes with their product and tie band, the best one emphasised."""
+    """Routes with what is expected of them, the best one emphasised."""
+    ties = [" > ".join(other.bodies) for other in routes[0].ties]
+    title = f"Routes from {routes[0].bodies[0]} to {routes[0].bodies[-1]}"
+    if routes[0].error is not None:
+        return _rehearsed_routes(routes, title, ties)
     columns = [Column("route"), Column("hops"), Column("T", digits=4), Column("±", digits=4), Column("links")]
     if predictor != "T":
         columns.insert(2, Column(predictor, digits=4))
@@ -47,9 +75,27 @@ def routes_table(routes: Sequence[Route], predictor: str = "T") -> Table:
         if predictor != "T":
             row.insert(2, route.score)
         rows.append(row)
-    ties = [" > ".join(other.bodies) for other in routes[0].ties]
     note = f"Within sampling noise of the best: {'; '.join(ties)}." if ties else ""
-    return Table(f"Routes from {routes[0].bodies[0]} to {routes[0].bodies[-1]}", columns, rows, note, strong=[0])
+    return Table(title, columns, rows, note, strong=[0])
+
+
+def _rehearsed_routes(routes: Sequence[Route], title: str, ties: list[str]) -> Table:
+    columns = [
+        Column("route"),
+        Column("hops"),
+        Column("expected error [mm]", digits=1),
+        Column("±", digits=1),
+        Column("T", digits=3),
+    ]
+    rows: list[list[Cell]] = []
+    notes = [f"Tie with the best (margin below its standard error): {'; '.join(ties)}."] if ties else []
+    for route in routes:
+        known = route.error is not None
+        error, spread = 1000.0 * (route.error or 0.0), 1000.0 * (route.standard_error or 0.0)
+        rows.append([" > ".join(route.bodies), str(route.hops), *((error, spread, route.T) if known else ("-",) * 3)])
+        if route.note:
+            notes.append(f"{' > '.join(route.bodies)} {route.note}.")
+    return Table(title, columns, rows, " ".join(notes), strong=[0])
 
 
 def suggestions_table(suggestions: Sequence[Suggestion], spanning: SpanningPairs | None = None) -> Table:

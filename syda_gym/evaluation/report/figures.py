@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -11,28 +12,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
+from syda_gym.embodiments.figure import bones, figure_points
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
+from syda_gym.look import PERSON, ROBOT_SHELL
 
 __all__ = ["Shape", "Track", "track"]
 
 Colour = tuple[float, float, float]
 
-# Thickness of the human figure as fractions of stature; only for looks.
-_BONES: tuple[tuple[str, str, float, str], ...] = (
-    ("Head", "Head", 0.062, "skin"), ("Head", "Neck", 0.024, "skin"),
-    ("LShoulder", "RShoulder", 0.040, "shirt"), ("LShoulder", "LHip", 0.042, "shirt"),
-    ("RShoulder", "RHip", 0.042, "shirt"), ("Neck", "Torso", 0.064, "shirt"),
-    ("Torso", "LHip", 0.050, "shirt"), ("Torso", "RHip", 0.050, "shirt"), ("LHip", "RHip", 0.050, "trousers"),
-    ("LShoulder", "LElbow", 0.027, "shirt"), ("LElbow", "LHand", 0.021, "skin"), ("LHand", "LHand", 0.028, "skin"),
-    ("RShoulder", "RElbow", 0.027, "shirt"), ("RElbow", "RHand", 0.021, "skin"), ("RHand", "RHand", 0.028, "skin"),
-    ("LHip", "LKnee", 0.038, "trousers"), ("LKnee", "LFoot", 0.030, "trousers"),
-    ("RHip", "RKnee", 0.038, "trousers"), ("RKnee", "RFoot", 0.030, "trousers"),
+_ARM_BONES = (
+    ("Shoulder", "Elbow", 0.029, "shirt"), ("Elbow", "Hand", 0.022, "skin"), ("Hand", "Hand", 0.028, "skin"),
 )  # fmt: skip
-_COLOURS: dict[str, Colour] = {
-    "skin": (0.91, 0.73, 0.60), "shirt": (0.25, 0.50, 0.78), "trousers": (0.26, 0.30, 0.40),
-}  # fmt: skip
-_ROBOT_COLOUR: Colour = (0.85, 0.85, 0.87)
 
 
 @dataclass(frozen=True)
@@ -100,9 +91,11 @@ def track(body: Embodiment, frames: ArrayLike) -> Track:
 
 def _human_track(body: Embodiment, frames: FloatArray) -> Track:
     if isinstance(body, HumanSkeleton):
-        joints = body.complete(frames)
-        bones: Sequence[tuple[str, str, float, str]] = [b for b in _BONES if b[0] in joints and b[1] in joints]
-        height, feet = body.height, [name for name in joints if name.endswith("Foot")]
+        joints = figure_points(body, frames)
+        solids: Sequence[tuple[str, str, float, str]] = bones(body)
+        used = {name for bone in solids for name in bone[:2]}
+        joints = {name: points for name, points in joints.items() if name in used}
+        height, feet = body.height, [name for name in joints if name.endswith(("Foot", "Toe"))]
     else:  # a body of the user's that is neither: its arms alone
         arms = body.arm_points(frames)
         joints = {
@@ -110,16 +103,20 @@ def _human_track(body: Embodiment, frames: FloatArray) -> Track:
             for i, side in enumerate("LR"[: arms.shape[1]])
             for p, part in enumerate(("Shoulder", "Elbow", "Hand"))
         }
-        bones = [b for b in _BONES if b[0] in joints and b[1] in joints]
+        solids = [
+            (f"{side}{a}", f"{side}{b}", radius, colour)
+            for side in "LR"[: arms.shape[1]]
+            for a, b, radius, colour in _ARM_BONES
+        ]
         height, feet = 3.0 * body.reach, list(joints)
     names = list(joints)
     points = np.stack([joints[name] for name in names], axis=1)
-    floor = np.median(np.min(np.stack([joints[name][:, 2] for name in feet], axis=1), axis=1)) - 0.03 * height
+    floor = np.median(np.min(np.stack([joints[name][:, 2] for name in feet], axis=1), axis=1)) - 0.024 * height
     middle = np.median(points[:, :, :2].mean(axis=1), axis=0)
     points = points - np.array([*middle, floor])
     shapes = tuple(
-        Shape("bone", (radius * height,), _COLOURS[colour], (names.index(a), names.index(b)))
-        for a, b, radius, colour in bones
+        Shape("bone", (radius * height,), PERSON[colour], (names.index(a), names.index(b)))
+        for a, b, radius, colour in solids
     )
     return Track(body.name, body.kind, shapes, points, np.zeros((len(points), 0, 7)), height)
 
@@ -140,11 +137,12 @@ class _RobotModel:
         from syda_gym.embodiments.kinematics.urdf import read_urdf
 
         self._robot = robot
-        self._model = read_urdf(robot.urdf).model
+        tree = read_urdf(robot.urdf)
+        self._model = tree.model
         self._data = self._model.createData()
-        urdf = yourdfpy.URDF.load(
-            str(robot.urdf), build_scene_graph=False, load_meshes=False, build_collision_scene_graph=False
-        )
+        # What is no URDF is shown by the shapes that it collides with.
+        source = str(robot.urdf) if robot.urdf.suffix.lower() == ".urdf" else io.BytesIO(tree.xml.encode())
+        urdf = yourdfpy.URDF.load(source, build_scene_graph=False, load_meshes=False, build_collision_scene_graph=False)
         rest = self.place(robot.rest)
         probe = self.place(np.clip(robot.rest + 0.3, robot.lower, robot.upper))
         self.links = [name for name in rest if name in urdf.link_map and not np.allclose(rest[name], probe[name])]
@@ -254,7 +252,7 @@ def _colour(solid: Any, colours: dict[str, Any]) -> Colour:
     material = getattr(solid, "material", None)
     found = None if material is None else material.color or colours.get(material.name)
     if found is None:
-        return _ROBOT_COLOUR
+        return ROBOT_SHELL
     return (float(found.rgba[0]), float(found.rgba[1]), float(found.rgba[2]))
 
 

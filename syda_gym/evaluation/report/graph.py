@@ -13,33 +13,39 @@ _WIDTH, _HEIGHT, _NODE = 720.0, 400.0, 34.0
 _MOST_LABELS = 30
 
 
-def graph_svg(graph: RouteGraph) -> str:
+def graph_svg(graph: RouteGraph, *, narrow: bool = False) -> str:
     """Draws bodies as circles and fitted pairs as arrows, thicker where transferability is higher.
 
     The chosen route is drawn in the accent colour. With many edges their labels are left to the pointer.
+
+    Args:
+        graph: what to draw.
+        narrow: half as wide, for a phone.
     """
-    places = _places(graph)
+    size = (360.0, 420.0) if narrow else (_WIDTH, _HEIGHT)
+    name = "-narrow" if narrow else ""  # of the arrow heads: two drawings of one page must not share them
+    places = _places(graph, *size)
     chosen = set(zip(graph.chosen[:-1], graph.chosen[1:], strict=True))
     node = _NODE if len(places) <= 10 else max(12.0, 300.0 / len(places))
     ordered = sorted(graph.edges, key=lambda edge: (edge.source, edge.target) in chosen)
     labels = len(ordered) <= _MOST_LABELS
     parts = [
-        _edge(edge, places, node, (edge.source, edge.target) in chosen, labels) for edge in ordered
+        _edge(edge, places, node, (edge.source, edge.target) in chosen, labels, name) for edge in ordered
     ] + [
-        _node(name, kind, *places[name], node, name in graph.chosen) for name, kind in graph.bodies.items()
+        _node(body, kind, *places[body], node, body in graph.chosen) for body, kind in graph.bodies.items()
     ]  # fmt: skip
     heads = "".join(
-        f'<marker id="{name}" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="{size}" markerHeight="{size}" '
+        f'<marker id="{head}{name}" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="{wide}" markerHeight="{wide}" '
         f'markerUnits="userSpaceOnUse" orient="auto"><path d="M0 1L10 5L0 9z" fill="{colour}"/></marker>'
-        for name, colour, size in (("head", "var(--soft)", 10), ("head-chosen", "var(--accent)", 13))
+        for head, colour, wide in (("head", "var(--soft)", 10), ("head-chosen", "var(--accent)", 13))
     )
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size[0]:g} {size[1]:g}" role="img" '
         f'aria-label="{escape(graph.title, quote=True)}" class="graph"><defs>{heads}</defs>{"".join(parts)}</svg>'
     )
 
 
-def _places(graph: RouteGraph) -> dict[str, tuple[float, float]]:
+def _places(graph: RouteGraph, width: float, height: float) -> dict[str, tuple[float, float]]:
     """Positions on an ellipse: humans over the left half, robots over the right one, in the order given."""
     humans = [name for name, kind in graph.bodies.items() if kind == "human"]
     robots = [name for name in graph.bodies if name not in humans]
@@ -47,12 +53,14 @@ def _places(graph: RouteGraph) -> dict[str, tuple[float, float]]:
     for names, side in ((humans, -1.0), (robots, 1.0)):
         for index, name in enumerate(names):
             angle = math.pi * ((index + 0.5) / len(names) - 0.5)
-            x = _WIDTH / 2 + side * (_WIDTH / 2 - 90) * math.cos(angle)
-            places[name] = (x, _HEIGHT / 2 + (_HEIGHT / 2 - 60) * math.sin(angle))
+            x = width / 2 + side * (width / 2 - (90 if width > 500 else 46)) * math.cos(angle)
+            places[name] = (x, height / 2 + (height / 2 - 60) * math.sin(angle))
     return places
 
 
-def _edge(edge: RouteEdge, places: dict[str, tuple[float, float]], node: float, chosen: bool, label: bool) -> str:
+def _edge(
+    edge: RouteEdge, places: dict[str, tuple[float, float]], node: float, chosen: bool, label: bool, suffix: str
+) -> str:
     (x0, y0), (x1, y1) = places[edge.source], places[edge.target]
     length = math.hypot(x1 - x0, y1 - y0) or 1.0
     ux, uy = (x1 - x0) / length, (y1 - y0) / length
@@ -76,7 +84,7 @@ def _edge(edge: RouteEdge, places: dict[str, tuple[float, float]], node: float, 
     return (
         f'<g><path d="M{start[0]:.1f} {start[1]:.1f}Q{cx:.1f} {cy:.1f} {end[0]:.1f} {end[1]:.1f}" fill="none" '
         f'stroke="{colour}" stroke-width="{width:.2f}" opacity="{0.95 if chosen else 0.5}" '
-        f'marker-end="url(#{head})"><title>{escape(words)}</title></path>{text}</g>'
+        f'marker-end="url(#{head}{suffix})"><title>{escape(words)}</title></path>{text}</g>'
     )
 
 

@@ -193,12 +193,15 @@ class Picture:
         data: the bytes of the file.
         kind: media type such as ``image/png`` or ``video/mp4``.
         note: text below.
+        variants: the same picture for other pages, of the same kind: ``"dark"``, ``"narrow"`` (a phone) and
+            ``"narrow-dark"``.
     """
 
     title: str
     data: bytes
     kind: str = "image/png"
     note: str = ""
+    variants: Mapping[str, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

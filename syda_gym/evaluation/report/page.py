@@ -105,21 +105,45 @@ def _block(block: Block) -> str:
     if isinstance(block, Picture):
         body = _picture(block)
     elif isinstance(block, BarPlot):
-        body = bar_svg(block)
+        body = _for_both(bar_svg(block), bar_svg(block, narrow=True))
     elif isinstance(block, CurvePlot):
-        body = curve_svg(block)
+        body = _for_both(curve_svg(block), curve_svg(block, narrow=True))
     else:
         assert isinstance(block, RouteGraph)
-        body = graph_svg(block)
+        body = _for_both(graph_svg(block), graph_svg(block, narrow=True))
     note = f'<p class="note">{escape(block.note)}</p>' if block.note else ""
     return f'<figure><figcaption>{escape(block.title)}</figcaption><div class="scroll">{body}</div>{note}</figure>'
 
 
+def _for_both(wide: str, narrow: str) -> str:
+    """One drawing for a screen and one for a phone; the style sheet shows one of them."""
+    return f'<div class="on-wide">{wide}</div><div class="on-narrow">{narrow}</div>'
+
+
 def _picture(picture: Picture) -> str:
-    source = f"data:{picture.kind};base64,{base64.b64encode(picture.data).decode('ascii')}"
+    source = _data(picture.kind, picture.data)
     if picture.kind.startswith("video/"):
         return f'<video controls loop muted playsinline src="{source}"></video>'
-    return f'<img alt="{escape(picture.title, quote=True)}" src="{source}">'
+    if not picture.variants:
+        return _img(picture, picture.data, "")
+    light = _one_theme(picture, picture.data, picture.variants.get("narrow"), "on-light")
+    dark = picture.variants.get("dark", picture.data)
+    return light + _one_theme(picture, dark, picture.variants.get("narrow-dark"), "on-dark")
+
+
+def _one_theme(picture: Picture, wide: bytes, narrow: bytes | None, theme: str) -> str:
+    if narrow is None:
+        return _img(picture, wide, theme)
+    return _img(picture, wide, f"{theme} on-wide") + _img(picture, narrow, f"{theme} on-narrow")
+
+
+def _img(picture: Picture, data: bytes, classes: str) -> str:
+    kind = f' class="{classes}"' if classes else ""
+    return f'<img{kind} alt="{escape(picture.title, quote=True)}" src="{_data(picture.kind, data)}">'
+
+
+def _data(kind: str, data: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
 
 
 def _table(table: Table) -> str:

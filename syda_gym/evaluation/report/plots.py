@@ -24,22 +24,38 @@ text { font: 13px system-ui, 'DejaVu Sans', sans-serif; fill: var(--ink); }
 """
 
 
-def bar_svg(plot: BarPlot) -> str:
-    """Bars in groups; with very many of them, or more series than colours, one row of dots a series."""
+def bar_svg(plot: BarPlot, *, narrow: bool = False) -> str:
+    """Bars in groups; with very many of them, or more series than colours, one row of dots a series.
+
+    Args:
+        plot: what to draw.
+        narrow: half as wide, for a phone, with letters of the same size.
+    """
     if len(plot.groups) * len(plot.series) > _MOST_BARS or len(plot.series) > COLOURS:
-        return _rows(plot)
-    return _bars(plot)
+        return _rows(plot, narrow)
+    return _bars(plot, narrow)
 
 
-def curve_svg(plot: CurvePlot) -> str:
-    """Curves with interval bands."""
-    canvas = _Canvas(720, 340, left=64, right=20, top=44 + 20 * ((len(plot.series) - 1) // 4), bottom=52)
+def curve_svg(plot: CurvePlot, *, narrow: bool = False) -> str:
+    """Curves with interval bands.
+
+    Args:
+        plot: what to draw.
+        narrow: half as wide, for a phone.
+    """
+    names = list(plot.series)
+    canvas = _Canvas(_width(narrow), 340, left=_left(narrow), right=16, top=44, bottom=52)
+    canvas.make_room_for(names)
     values = [v * plot.scale for e in plot.series.values() for one in e for v in (one.value, one.low, one.high)]
     canvas.y_axis(values, plot.y_label)
     spread = (max(plot.x) - min(plot.x)) or 1.0
     place = [canvas.left + 14 + (canvas.inner_width - 28) * (x - min(plot.x)) / spread for x in plot.x]
+    free = -math.inf
     for x, at in zip(plot.x, place, strict=True):
-        canvas.text(at, canvas.bottom + 20, f"{x:g}", anchor="middle", soft=True)
+        words = f"{x:g}"
+        if at - 4.2 * len(words) > free:  # numbers that would run into the one before are left out
+            canvas.text(at, canvas.bottom + 20, words, anchor="middle", soft=True)
+            free = at + 4.2 * len(words)
     canvas.text(canvas.left + canvas.inner_width / 2, canvas.bottom + 42, plot.x_label, anchor="middle", soft=True)
     for index, (name, estimates) in enumerate(plot.series.items()):
         colour = f"var(--s{index % COLOURS})"
@@ -64,10 +80,14 @@ def standalone(svg: str) -> str:
     return f'<?xml version="1.0"?>\n{head}><style>{_STANDALONE_STYLE}</style>{tail}\n'
 
 
-def _bars(plot: BarPlot) -> str:
-    lines = 1 + (len(plot.series) - 1) // 4
-    slanted = max(len(group) for group in plot.groups) * 7.4 > 644 / len(plot.groups)
-    canvas = _Canvas(720, 360 if slanted else 320, left=64, right=12, top=24 + 20 * lines, bottom=78 if slanted else 36)
+def _bars(plot: BarPlot, narrow: bool) -> str:
+    room = _width(narrow) - _left(narrow) - 12
+    slanted = max(len(group) for group in plot.groups) * 7.4 > room / len(plot.groups)
+    canvas = _Canvas(
+        _width(narrow), 360 if slanted else 320, left=_left(narrow), right=12, top=24, bottom=88 if slanted else 36
+    )
+    if len(plot.series) > 1 or next(iter(plot.series)):
+        canvas.make_room_for(list(plot.series))
     values = [v * plot.scale for es in plot.series.values() for e in es for v in (e.value, e.high)]
     canvas.y_axis([0.0, *values], plot.label)
     group_width = canvas.inner_width / len(plot.groups)
@@ -99,14 +119,18 @@ def _bar(canvas: _Canvas, x: float, width: float, e: Estimate, scale: float, ser
     )
 
 
-def _rows(plot: BarPlot) -> str:
+def _rows(plot: BarPlot, narrow: bool) -> str:
     """One row a series, one dot a group, sorted by the first group: for hundreds of chains."""
     names = sorted(plot.series, key=lambda name: (math.isnan(plot.series[name][0].value), plot.series[name][0].value))
     longest = min(44, max(len(name) for name in names))
-    legend = 24 if len(plot.groups) > 1 else 4
-    canvas = _Canvas(720, 17 * len(names) + 62 + legend, left=16 + 7 * longest, right=22, top=legend + 16, bottom=40)
+    pitch = 32 if narrow else 17  # a phone has no room beside the dots: the name stands above them
+    canvas = _Canvas(
+        _width(narrow), pitch * len(names) + 66, left=14 if narrow else 16 + 7 * longest, right=22, top=20, bottom=40
+    )
+    if len(plot.groups) > 1:
+        canvas.make_room_for(list(plot.groups))
     values = [e.high * plot.scale for name in names for e in plot.series[name] if math.isfinite(e.high)]
-    ticks = _ticks([0.0, *values])
+    ticks = _ticks([0.0, *values], 4 if narrow else 5)
     span = ticks[-1] or 1.0
 
     def x(value: float) -> float:
@@ -117,9 +141,12 @@ def _rows(plot: BarPlot) -> str:
         canvas.text(x(tick), canvas.bottom + 16, f"{tick:g}", anchor="middle", soft=True)
     canvas.text(canvas.left + canvas.inner_width / 2, canvas.bottom + 34, plot.label, anchor="middle", soft=True)
     for row, name in enumerate(names):
-        y = canvas.top + 17 * (row + 0.5)
+        y = canvas.top + pitch * (row + 0.5) + (6 if narrow else 0)
         shown = name if len(name) <= 44 else name[:43] + "…"
-        canvas.text(canvas.left - 8, y + 4, shown, anchor="end", soft=True)
+        if narrow:
+            canvas.text(canvas.left, y - 10, shown, soft=True)
+        else:
+            canvas.text(canvas.left - 8, y + 4, shown, anchor="end", soft=True)
         for g, e in enumerate(plot.series[name]):
             if math.isfinite(e.value):
                 colour = f"var(--s{g % COLOURS})"
@@ -132,6 +159,14 @@ def _rows(plot: BarPlot) -> str:
     if len(plot.groups) > 1:
         canvas.legend(list(plot.groups))
     return canvas.svg(plot.title)
+
+
+def _width(narrow: bool) -> float:
+    return 360.0 if narrow else 720.0
+
+
+def _left(narrow: bool) -> float:
+    return 52.0 if narrow else 64.0
 
 
 class _Canvas:
@@ -171,10 +206,27 @@ class _Canvas:
             f'transform="translate(16 {(self.top + self.bottom) / 2:.1f}) rotate(-90)">{escape(label)}</text>'
         )
 
+    def make_room_for(self, names: Sequence[str]) -> None:
+        """Moves the drawing down by what a legend of these names takes, and makes the picture taller by it."""
+        rows = 1 + max(row for row, _ in self._legend_places(names))
+        self.top += 20 * rows
+        self.bottom += 20 * rows
+        self.height += 20 * rows
+
+    def _legend_places(self, names: Sequence[str]) -> list[tuple[int, float]]:
+        """Row and left edge of each entry: as many a row as fit, none over another."""
+        places, row, x = [], 0, self.left
+        for name in names:
+            wide = 16 + 7.6 * len(name) + 14
+            if x > self.left and x + wide - 14 > self.width:
+                row, x = row + 1, self.left
+            places.append((row, x))
+            x += wide
+        return places
+
     def legend(self, names: Sequence[str]) -> None:
-        for index, name in enumerate(names):
-            x = self.left + (index % 4) * (self.inner_width / min(4, max(2, len(names))))
-            y = 16 + 20 * (index // 4)
+        for index, (name, (row, x)) in enumerate(zip(names, self._legend_places(names), strict=True)):
+            y = 16 + 20 * row
             self.add(f'<rect x="{x:.1f}" y="{y - 9}" width="11" height="11" rx="2" fill="var(--s{index % COLOURS})"/>')
             self.text(x + 16, y + 1, name)
 

@@ -9,11 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
+from syda_gym.errors import MappingError
 from syda_gym.mappings.coding.arm_coders import HumanArmCoder
 from syda_gym.mappings.coding.coders import Arrays, Coder
 from syda_gym.motions.clip import PairedMotions
 
 __all__ = ["WindowCoder", "encode_clips", "past_frames"]
+
+_LONGEST = 250  # frames
 
 
 class WindowCoder(Coder):
@@ -32,6 +35,8 @@ class WindowCoder(Coder):
     def __init__(self, body: Embodiment, settings: dict[str, Any], arrays: Arrays) -> None:
         super().__init__(body)
         self.window = int(settings["window"])
+        if not 0 <= self.window <= _LONGEST:
+            raise MappingError(f"a window of {self.window} frames; expected 0 to {_LONGEST}")
         self.inner = HumanArmCoder(body, settings["inner"], arrays)
 
     @classmethod

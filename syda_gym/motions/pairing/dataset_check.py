@@ -13,7 +13,7 @@ from syda_gym.errors import EmbodimentError, MotionError
 from syda_gym.motions.clip import Motions, Take
 from syda_gym.motions.dataset import INDEX, dataset_root, read_index, read_take
 from syda_gym.motions.pairing.alignment import pair_quality
-from syda_gym.motions.readers.npz import body_from_spec
+from syda_gym.motions.readers.own.npz import body_from_spec
 
 __all__ = ["Finding", "validate_dataset"]
 

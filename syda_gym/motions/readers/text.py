@@ -10,17 +10,24 @@ import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import MotionError
+from syda_gym.files import BUDGET, read_bytes
 
-__all__ = ["MAX_BYTES", "first_bytes", "numbers", "read_lines", "split_row"]
+__all__ = ["GAPS", "MAX_BYTES", "first_bytes", "numbers", "read_lines", "split_row"]
 
-MAX_BYTES = 256 * 2**20
+MAX_BYTES = BUDGET.text
 """Larger text files are refused: half an hour of full-body motion capture is about 100 MB."""
+
+GAPS = {"", "nan", "-nan", "-nan(ind)", "null", "none", "na", "n/a", "#n/a", "-", "?", "undefined"}
+"""What tools write where a number is not known."""
 
 _SEPARATORS = re.compile(r"[,;\s]+")
 
 
 def read_lines(path: Path, kind: str) -> list[str]:
     """The lines of a text recording without line ends.
+
+    UTF-8 and UTF-16 with a mark are told by it; anything else that is no UTF-8 is read as Latin-1: names may have
+    accents, the numbers read the same.
 
     Args:
         path: the file.
@@ -29,21 +36,22 @@ def read_lines(path: Path, kind: str) -> list[str]:
     Raises:
         MotionError: missing, too large, or not text.
     """
-    if not path.is_file():
-        raise MotionError(f"no file {path}; expected {kind}")
-    size = path.stat().st_size
-    if size > MAX_BYTES:
-        raise MotionError(f"{path} has {size >> 20} MB; at most {MAX_BYTES >> 20} MB are read. Cut it into pieces")
-    content = path.read_bytes()
-    if b"\0" in content:
-        raise MotionError(f"{path} is binary, not text; expected {kind}")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = content.decode("latin-1")  # names may have accents; the numbers read the same
+    content = read_bytes(path, MAX_BYTES, f"{kind}; cut it into pieces", MotionError)
+    if sum(content.count(mark) for mark in (b" ", b",", b";", b"\t", b"\n")) > 2 * BUDGET.elements:
+        raise MotionError(f"{path} holds more than {BUDGET.elements} numbers; cut it into pieces")
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        text = content.decode("utf-16", errors="replace")
+    else:
+        if b"\0" in content:
+            raise MotionError(f"{path} is binary, not text; expected {kind}")
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = content.decode("latin-1")
     if not text.strip():
         raise MotionError(f"{path} is empty; expected {kind}")
-    return text.splitlines()
+    # Not ``splitlines``, which also splits at marks that stand inside names (vertical tab, next line, ...).
+    return text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
 
 
 def first_bytes(path: Path, count: int = 4096) -> bytes:
@@ -82,7 +90,9 @@ def numbers(cells: Sequence[str], path: Path, line: int) -> FloatArray:
         try:
             values[column] = float(cell) if cell else np.nan
         except ValueError:
-            raise MotionError(f"{path}, line {line}, column {column + 1}: {cell[:40]!r} is no number") from None
+            if cell.strip().lower() not in GAPS:
+                raise MotionError(f"{path}, line {line}, column {column + 1}: {cell[:40]!r} is no number") from None
+            values[column] = np.nan
     if np.isinf(values).any():
         column = int(np.flatnonzero(np.isinf(values))[0])
         raise MotionError(f"{path}, line {line}, column {column + 1}: the number is infinite")

@@ -14,6 +14,16 @@ from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, nearest_name
+from syda_gym.look import (
+    LIGHT_AMBIENT,
+    LIGHT_DIFFUSE,
+    LIGHT_FROM,
+    LIGHT_SPECULAR,
+    REFERENCE,
+    SKY_BOTTOM,
+    SKY_TOP,
+    rgba,
+)
 from syda_gym.simulation.landmark_kinematics import LandmarkKinematics
 from syda_gym.simulation.pictures.frustum import Frustum, PictureWindow
 from syda_gym.simulation.pictures.scene import Marker, PosedRobot, PosedSkeleton, floor_below
@@ -23,11 +33,10 @@ __all__ = ["GHOST_COLOR", "Camera", "CameraView", "Picture", "error_color"]
 
 Picture = NDArray[np.uint8]
 
-GHOST_COLOR = (0.25, 0.55, 1.0, 1.0)
+GHOST_COLOR = rgba(REFERENCE)
 _GHOST_SHARE = 0.45
 _GHOST_FINEST = 0.012  # m; a ghost has no fingers, which are most of the triangles
 _GHOST_GAP = 2e-5  # of depth, so that a ghost that coincides with the robot does not flicker
-_SKY_TOP, _SKY_BOTTOM = (0.97, 0.98, 1.0), (0.86, 0.89, 0.94)
 _GIRTH = 0.15  # m around the origins of links that their shapes are looked for in; grows where it proves too little
 
 
@@ -214,7 +223,7 @@ class Camera:
         self._clients.remove(client)
         sky = depth >= 1.0
         shade = np.linspace(0.0, 1.0, self.view.height)[:, None, None]
-        gradient = 255.0 * ((1.0 - shade) * np.array(_SKY_TOP) + shade * np.array(_SKY_BOTTOM))
+        gradient = 255.0 * ((1.0 - shade) * np.array(SKY_TOP) + shade * np.array(SKY_BOTTOM))
         image[sky] = np.broadcast_to(gradient, image.shape)[sky].astype(np.uint8)
         return image, depth
 
@@ -257,10 +266,10 @@ class Camera:
             window.height,
             self._frustum.view,
             self._frustum.projection(window),
-            lightDirection=(1.5, 0.9, 2.2),
-            lightAmbientCoeff=0.62,
-            lightDiffuseCoeff=0.40,
-            lightSpecularCoeff=0.06,
+            lightDirection=LIGHT_FROM,
+            lightAmbientCoeff=LIGHT_AMBIENT,
+            lightDiffuseCoeff=LIGHT_DIFFUSE,
+            lightSpecularCoeff=LIGHT_SPECULAR,
             shadow=0,
             flags=self._bullet.ER_NO_SEGMENTATION_MASK,
             renderer=self._bullet.ER_TINY_RENDERER,

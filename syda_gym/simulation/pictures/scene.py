@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.embodiments.human import BONES, HumanSkeleton
+from syda_gym.embodiments.figure import bones, figure_points
+from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.kinematics.urdf import read_urdf
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import EmbodimentError
+from syda_gym.look import GROUND, PERSON
 from syda_gym.simulation.plain_body import plain_body, shapes_at_rest
 from syda_gym.simulation.quiet import quiet
 
@@ -22,11 +24,6 @@ __all__ = ["Marker", "PosedRobot", "PosedSkeleton", "floor_below"]
 _logger = logging.getLogger("syda_gym.simulation")
 _told: set[str] = set()  # files whose missing meshes were told of
 
-_BONE_RADIUS = 0.022
-_JOINT_RADIUS = 0.032
-_HEAD_RADIUS = 0.095
-_BONE_COLOR = (0.93, 0.55, 0.22, 1.0)
-_JOINT_COLOR = (0.80, 0.40, 0.12, 1.0)
 _AWAY = (0.0, 0.0, -1000.0)
 _HIDDEN = (1.0, 1.0, 1.0, 0.0)
 
@@ -147,7 +144,7 @@ class PosedRobot:
 
 
 class PosedSkeleton:
-    """A human drawn as bones and joints, standing at ``place``.
+    """A human of round bones, see ``embodiments.figure``, standing at ``place``.
 
     Args:
         human: who.
@@ -161,35 +158,39 @@ class PosedSkeleton:
 
         self._bullet, self._client, self._human = pybullet, client, human
         self._place = np.asarray(place, dtype=np.float64)
-        standing = {name: points[0] for name, points in human.complete(human.standing()).items()}
+        standing = {name: points[0] for name, points in figure_points(human, human.standing()).items()}
         self._bones: list[tuple[str, str, int]] = []
         self._balls: list[tuple[str, int]] = []
-        for first, second in BONES:
-            if {first, second} <= set(standing) and _wanted(second, moving):
-                length = float(np.linalg.norm(standing[second] - standing[first]))
-                self._bones.append((first, second, _bone(pybullet, client, _BONE_RADIUS, length)))
-        for name in standing:
-            if _wanted(name, moving):
-                head = name == "Head"
-                radius, color = (_HEAD_RADIUS, _BONE_COLOR) if head else (_JOINT_RADIUS, _JOINT_COLOR)
-                self._balls.append((name, _ball(pybullet, client, radius, color)))
+        seen: set[tuple[str, str, float]] = set()
+        for bone in bones(human):
+            if moving is not None and bone.moves != moving:
+                continue
+            radius, color = bone.radius * human.height, (*PERSON[bone.colour], 1.0)
+            if bone.start != bone.end:
+                length = float(np.linalg.norm(standing[bone.end] - standing[bone.start]))
+                self._bones.append((bone.start, bone.end, _bone(pybullet, client, radius, length, color)))
+            for name in {bone.start, bone.end}:
+                if (name, bone.colour, radius) not in seen:
+                    seen.add((name, bone.colour, radius))
+                    self._balls.append((name, _ball(pybullet, client, radius, color)))
+        self._sole = 0.024 * human.height
         self.pose(human.standing())
 
     def pose(self, frame: FloatArray) -> None:
         """Takes a frame ``(F,)`` in the human's own features."""
-        joints = {name: points[0] for name, points in self._human.complete(frame).items()}
-        feet = min(joints[name][2] for name in ("LFoot", "RFoot"))
-        hips = 0.5 * (joints["LHip"] + joints["RHip"])
-        shift = self._place - np.array([hips[0], hips[1], feet - _JOINT_RADIUS])
-        self._points = np.array([joints[name] + shift for name, _ in self._balls])
+        points = {name: rows[0] for name, rows in figure_points(self._human, frame).items()}
+        feet = min(points[name][2] for name in ("LFoot", "RFoot", "LToe", "RToe"))
+        hips = 0.5 * (points["LHip"] + points["RHip"])
+        shift = self._place - np.array([hips[0], hips[1], feet - self._sole])
+        self._points = np.array([points[name] + shift for name, _ in self._balls])
         for first, second, body in self._bones:
-            a, b = joints[first] + shift, joints[second] + shift
+            a, b = points[first] + shift, points[second] + shift
             self._move(body, 0.5 * (a + b), _turn_to(b - a))
         for name, body in self._balls:
-            self._move(body, joints[name] + shift, (0.0, 0.0, 0.0, 1.0))
+            self._move(body, points[name] + shift, (0.0, 0.0, 0.0, 1.0))
 
     def points(self) -> FloatArray:
-        """Where its joints are, ``(N, 3)`` [m]."""
+        """Where its points are, ``(N, 3)`` [m]."""
         return self._points
 
     def _move(self, body: int, position: FloatArray, orientation: Sequence[float]) -> None:
@@ -227,7 +228,7 @@ def floor_below(client: int, height: float) -> None:
     import pybullet
 
     shape = pybullet.createVisualShape(
-        pybullet.GEOM_BOX, halfExtents=(6.0, 6.0, 0.01), rgbaColor=(0.80, 0.82, 0.85, 1.0), physicsClientId=client
+        pybullet.GEOM_BOX, halfExtents=(20.0, 20.0, 0.01), rgbaColor=(*GROUND, 1.0), physicsClientId=client
     )
     pybullet.createMultiBody(0.0, -1, shape, (0.0, 0.0, height - 0.01), physicsClientId=client)
 
@@ -240,20 +241,16 @@ def _hangs_on(link: int, arms: set[int], parents: dict[int, int]) -> bool:
     return False
 
 
-def _wanted(joint: str, moving: bool | None) -> bool:
-    return moving is None or (joint[1:] in ("Shoulder", "Elbow", "Hand")) == moving
-
-
 def _ball(bullet: Any, client: int, radius: float, color: Sequence[float]) -> int:
     shape = bullet.createVisualShape(bullet.GEOM_SPHERE, radius=radius, rgbaColor=color, physicsClientId=client)
     body: int = bullet.createMultiBody(0.0, -1, shape, _AWAY, physicsClientId=client)
     return body
 
 
-def _bone(bullet: Any, client: int, radius: float, length: float) -> int:
+def _bone(bullet: Any, client: int, radius: float, length: float, color: Sequence[float]) -> int:
     # A cylinder, whose ends lie inside the joints' balls: a capsule takes three times as long to draw.
     shape = bullet.createVisualShape(
-        bullet.GEOM_CYLINDER, radius=radius, length=length, rgbaColor=_BONE_COLOR, physicsClientId=client
+        bullet.GEOM_CYLINDER, radius=radius, length=length, rgbaColor=color, physicsClientId=client
     )
     body: int = bullet.createMultiBody(0.0, -1, shape, _AWAY, physicsClientId=client)
     return body

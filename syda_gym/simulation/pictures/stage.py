@@ -8,9 +8,9 @@ from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.simulation.plain_body import shapes_at_rest
 
-__all__ = ["Stage"]
+__all__ = ["OPERATOR_AT", "Stage"]
 
-_OPERATOR_AT = 0.95  # m to the robot's left, of robots with arms no longer than a person's
+OPERATOR_AT = 0.95  # m to the robot's left, of robots with arms no longer than a person's
 _MARKER_RADIUS = 0.046  # m, of robots with arms as long as Pepper's or longer
 _NEAREST = 3.0  # m; from there a person stands in the picture
 
@@ -39,7 +39,7 @@ class Stage:
         shoulders = robot.arm_points(robot.rest)[0, :, 0]
         reach = 1.15 * robot.reach  # with hands
         widest = max(float(np.abs(body[:, 1]).max()), float(np.abs(shoulders[:, 1]).max()) + reach)
-        self.operator_at = max(_OPERATOR_AT, min(widest, 1.5) + 0.15 if widest > 1.2 * _OPERATOR_AT else 0.0)
+        self.operator_at = max(OPERATOR_AT, min(widest, 1.5) + 0.15 if widest > 1.2 * OPERATOR_AT else 0.0)
         self.marker = _MARKER_RADIUS * min(max(robot.reach / 0.3, 0.25), 1.0)
         # The robot's own space, the one that its arms can sweep, and the operator's.
         self._robot_top = max(float(body[:, 2].max()), float(shoulders[:, 2].max()) + reach)

@@ -62,7 +62,26 @@ def write_video(path: str | os.PathLike[str], pictures: Iterable[ArrayLike], fps
             raise StorageError(f"ffmpeg could not write {target}: {error}") from error
         finally:
             writer.close()
+        # ffmpeg may die without a word, on a full disk for example; what it left then is no film.
+        if not _whole(temporary):
+            raise StorageError(f"ffmpeg left no whole film for {target}; is the disk full?")
     return target
+
+
+def _whole(path: Path) -> bool:
+    """Whether an ``.mp4`` consists of whole boxes, an index (``moov``) and pictures (``mdat``) among them."""
+    size, place, found = path.stat().st_size, 0, set()
+    with path.open("rb") as file:
+        while place + 8 <= size:
+            file.seek(place)
+            head = file.read(16)
+            length, kind = int.from_bytes(head[:4], "big"), head[4:8]
+            length = int.from_bytes(head[8:16], "big") if length == 1 else length
+            if length < 8 or place + length > size:
+                return False
+            found.add(kind)
+            place += length
+    return place == size and {b"moov", b"mdat"} <= found
 
 
 def _checked(picture: Any, shape: tuple[int, ...] | None) -> Any:

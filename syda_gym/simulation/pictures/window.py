@@ -72,12 +72,12 @@ class Window:
         )
         self._next = time.monotonic()
 
-    def show(self, q: FloatArray, *, reference: FloatArray, operator: FloatArray, errors: FloatArray) -> None:
+    def show(self, q: FloatArray, *, reference: FloatArray, operator: FloatArray | None, errors: FloatArray) -> None:
         """Shows one frame and waits until it is time for the next one; arguments as ``Camera.picture``."""
         self._puppet.pose(q)
         if self._ghost is not None:
             self._ghost.pose(reference)
-        if self._operator is not None:
+        if self._operator is not None and operator is not None:
             self._operator.pose(operator)
         points = self._robot.landmarks(q)[0]
         for marker, point, error in zip(self._markers, points, errors.tolist(), strict=False):

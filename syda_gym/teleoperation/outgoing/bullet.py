@@ -6,7 +6,7 @@ import os
 import queue
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
+from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, TeleoperationError
 from syda_gym.simulation.making import make_world
@@ -32,7 +33,7 @@ class BulletSink(Sink):
 
     Args:
         robot: who follows.
-        operator: whose body is named in the window; it is not drawn, for frames do not reach the sink.
+        operator: who leads, shown beside the robot once ``accompany`` says where to ask for frames.
         window: show PyBullet's window; needs a display.
         video: write what would be seen to this ``.mp4``.
         rate: control steps per second; physics runs at 240 Hz or the next multiple.
@@ -74,6 +75,17 @@ class BulletSink(Sink):
         self._pictures: queue.Queue[NDArray[np.uint8] | None] = queue.Queue(_PICTURES)
         self._writer: threading.Thread | None = None
         self._failure: Exception | None = None
+        self._news: list[str] = []
+        self._blind = False
+        self._frame: Callable[[], FloatArray | None] = lambda: None
+
+    def accompany(self, frame: Callable[[], FloatArray | None]) -> None:
+        """Shows the operator in films and in the window.
+
+        Args:
+            frame: called from the simulation's thread; the operator's newest frame ``(F,)``, or ``None``.
+        """
+        self._frame = frame
 
     def open(self) -> None:
         """Builds the world and starts to simulate.
@@ -89,11 +101,11 @@ class BulletSink(Sink):
             raise OptionError(
                 "the sink 'window' needs a display ($DISPLAY is not set); use 'bullet' or 'video:FILE.mp4'"
             )
-        view = CameraView.resolve({"operator": False, **self.camera})
+        view = CameraView.resolve({"operator": self.operator is not None, **self.camera})
         if self.window:
             self._eye = Window(self.robot, self.operator or self.robot, view, float(self.rates.control_hz))
         elif self.video is not None:
-            self._eye = Camera(self.robot, None, view)
+            self._eye = Camera(self.robot, self.operator, view)
         self._world = make_world(self.robot, self.rates)
         self._ending.clear()
         if self.video is not None and not self.window:
@@ -118,13 +130,18 @@ class BulletSink(Sink):
         """Takes over the command; after an emergency stop none until it is released.
 
         Raises:
-            TeleoperationError: the simulation or the video has failed.
+            TeleoperationError: the simulation has failed.
         """
         if self._failure is not None:
             raise TeleoperationError(f"the simulated robot failed: {self._failure}") from self._failure
         if decision.state is State.STOPPED:
             return
         self._command = decision.command  # without the lock, for the loop must not wait for physics
+
+    def news(self) -> list[str]:
+        """Whether the film failed."""
+        news, self._news = self._news, []
+        return news
 
     def stop(self) -> None:
         """Holds the pose that the simulated robot has now."""
@@ -169,15 +186,25 @@ class BulletSink(Sink):
             self._failure = error
 
     def _show(self, command: FloatArray, pose: FloatArray, steps: int) -> None:
-        if self._eye is None:
+        if self._eye is None or self._blind:
             return
+        try:
+            self._draw(command, pose, steps)
+        except Exception as error:  # a closed window must not end the robot
+            self._blind = True
+            self._news.append(f"pictures dropped: {error}")
+
+    def _draw(self, command: FloatArray, pose: FloatArray, steps: int) -> None:
         n = self.robot.n_features
         angles = pose[:n]
         errors = np.linalg.norm(pose[n:].reshape(-1, 3) - self.robot.landmarks(command)[0], axis=-1)
+        frame = self._frame()
+        if frame is None and isinstance(self.operator, HumanSkeleton):
+            frame = self.operator.standing()
         if self.window:
-            self._eye.show(angles, reference=command, operator=np.zeros(0), errors=errors)
+            self._eye.show(angles, reference=command, operator=frame, errors=errors)
         else:
-            picture = self._eye.picture(angles, reference=command, errors=errors)
+            picture = self._eye.picture(angles, reference=command, operator=frame, errors=errors)
             for _ in range(steps):  # so that the film lasts as long as what it shows
                 self._pictures.put(picture)
 
@@ -191,7 +218,7 @@ class BulletSink(Sink):
         if self.video is not None:
             try:
                 write_video(self.video, pictures(), float(self.rates.control_hz))
-            except Exception as error:  # told to the loop by the next send
-                self._failure = error
+            except Exception as error:  # the robot goes on without its film
+                self._news.append(f"film dropped: {error}")
                 while self._pictures.get() is not None:
                     pass  # the simulation must not wait for a reader that is gone

@@ -1,4 +1,4 @@
-"""A picture of what was found in a robot: its shapes, the proposed landmarks, joints used and left out, and a person."""
+"""A picture of what was found in a robot: shapes, proposed landmarks, joints used and left out, and a person."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.embodiments.reading.shapes import corners
 from syda_gym.embodiments.robot import Robot
 from syda_gym.files import atomic_path
+from syda_gym.look import LEFT, RIGHT
 
 __all__ = ["draw_robot"]
 
-_COLOURS = {"left": "#c44e52", "right": "#4c72b0"}
+_COLOURS = {"left": LEFT, "right": RIGHT}
 _VIEWS = (("front", 1, 2), ("from its right", 0, 2), ("from above", 1, 0))
 _POINTS = ("shoulder", "elbow", "wrist")
 _PERSON = "#dd8452"

@@ -95,10 +95,11 @@ def add_robot(
     description, notices = describe_robot(urdf, chosen, left=left, right=right, torso=torso)
     robot = Robot(description)
     verdict = judge_robot(robot)
+    title = f"points its limbs within {np.degrees(verdict.error):.1f} degrees of a person's: {verdict.word}"
+    # The picture first: a robot that cannot be drawn is not added.
+    picture = draw_robot(robot, path.with_suffix(".png"), title=title)
     write_text(path, robot_yaml(description))
     catalog.register(chosen, Robot.read(path), replace=True)
-    title = f"points its limbs within {np.degrees(verdict.error):.1f} degrees of a person's: {verdict.word}"
-    picture = draw_robot(robot, path.with_suffix(".png"), title=title)
     return AddedRobot(robot, path, picture, verdict, tuple(notices))
 
 

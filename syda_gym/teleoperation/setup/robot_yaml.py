@@ -28,8 +28,8 @@ def robot_yaml(description: RobotDescription) -> str:
     arms = [_arm(arm) for arm in description.arms]
     parts.append(
         (
-            "# Links that carry shoulder, elbow, wrist and the end of the arm; a point off its link's origin is written\n"
-            "# {link: NAME, offset: [x, y, z]} in the link's frame.",
+            "# Links that carry shoulder, elbow, wrist and the end of the arm; a point off its link's origin is\n"
+            "# written {link: NAME, offset: [x, y, z]}, in the link's frame.",
             {"arms": arms},
         )
     )

@@ -75,13 +75,13 @@ def _reason(robot: Robot, reached: FloatArray, upper: float, fore: float) -> str
     for arm, lengths in zip(robot.description.arms, robot.arm_lengths, strict=True):
         if lengths[0] < _SHORT * lengths[1]:
             return (
-                f"the upper arm is short ({1000 * lengths[0]:.0f} mm): the elbow lies at the shoulder's {arm.elbow!r}; name "
-                "a link beyond the wrist with --left or --right"
+                f"the upper arm is short ({1000 * lengths[0]:.0f} mm): the elbow lies at the shoulder's {arm.elbow!r}; "
+                "name a link beyond the wrist with --left or --right"
             )
         if lengths[1] < _SHORT * lengths[0]:
             return (
-                f"the forearm is short ({1000 * lengths[1]:.0f} mm): the elbow lies at the wrist's {arm.elbow!r}; name a "
-                "link nearer to the elbow with --left or --right"
+                f"the forearm is short ({1000 * lengths[1]:.0f} mm): the elbow lies at the wrist's {arm.elbow!r}; name "
+                "a link nearer to the elbow with --left or --right"
             )
     for chain, arm in zip(robot.chains, robot.description.arms, strict=True):
         q = np.random.default_rng(0).uniform(chain.lower, chain.upper, (16, chain.n_joints))
@@ -99,8 +99,8 @@ def _reason(robot: Robot, reached: FloatArray, upper: float, fore: float) -> str
     which = "upper arms" if upper > fore else "forearms"
     if at[worst] > _OFTEN:
         return (
-            f"mostly the {which}: joint {robot.joint_names[worst]!r} is at a limit in {100 * at[worst]:.0f} % of the poses "
-            f"({robot.lower[worst]:.2f} to {robot.upper[worst]:.2f} rad)"
+            f"mostly the {which}: joint {robot.joint_names[worst]!r} is at a limit in {100 * at[worst]:.0f} % of the "
+            f"poses ({robot.lower[worst]:.2f} to {robot.upper[worst]:.2f} rad)"
         )
     return f"mostly the {which}; look whether the coloured arms of the picture lie on the robot's"
 

@@ -174,3 +174,41 @@ def test_mjcf_is_named_where_mujoco_is_not_installed(monkeypatch: pytest.MonkeyP
     monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match=r"is MJCF, MuJoCo's format.*syda-gym\[mjcf\]"):
         discover(CASES / "mjcf_model.xml")
+
+
+def changed(tmp_path: Path, *replacements: tuple[str, str]) -> Path:
+    text = (CASES / "control.urdf").read_text()
+    for old, new in replacements:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "robot.urdf"
+    path.write_text(text)
+    return path
+
+
+def test_an_arm_cut_by_a_prismatic_joint_is_refused_with_its_name(tmp_path: Path) -> None:
+    path = changed(tmp_path, ('shoulder_yaw" type="revolute"', 'shoulder_yaw" type="prismatic"'))
+    with pytest.raises(EmbodimentError, match=r"prismatic joint 'left_shoulder_yaw' between 'left_shoulder_roll' and"):
+        discover(path)
+
+
+@pytest.mark.parametrize("rpy", ["0 0 0.7853981", "-1.5707963 0 0", "1.5707963 0 1.5707963"])
+def test_a_root_that_is_turned_turns_no_body(tmp_path: Path, rpy: str) -> None:
+    lay = (
+        f'<link name="base"/><joint name="lay" type="fixed"><origin rpy="{rpy}"/><parent link="base"/>'
+        '<child link="torso"/></joint><link name="torso">'
+    )
+    robot = Robot(discover(changed(tmp_path, ('<link name="torso">', lay))))
+    left, right = robot.arm_points(np.zeros(14))[0, :, 0]
+    np.testing.assert_allclose(left - right, [0.0, 0.4, 0.0], atol=1e-6)
+    assert robot.arm_points(np.zeros(14))[0, 0, 2, 2] < left[2] - 0.5
+
+
+def test_left_is_what_is_called_left(tmp_path: Path) -> None:
+    path = changed(tmp_path, ("left_", "tmp_"), ("right_", "left_"), ("tmp_", "right_"))
+    assert discover(path).axes == ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def test_a_wrist_whose_frame_slid_along_its_axis(tmp_path: Path) -> None:
+    moved = ('<origin xyz="0 0 -0.25" rpy="0 0 0"/>', '<origin xyz="0.2 0 -0.25" rpy="0 0 0"/>')
+    assert discover(changed(tmp_path, moved)).arms[0].offsets["wrist"] == (-0.2, 0.0, 0.0)

@@ -30,7 +30,7 @@ def changed(folder: Path, *replacements: tuple[str, str]) -> Path:
         ('<link name="head">', "<link>", "line 4: a <link> has no name"),
         ('<link name="head">', '<link name="torso">', "line 4: link 'torso' is there twice"),
         ('name="left_elbow_pitch" type', 'name="left_wrist_roll" type', "joint 'left_wrist_roll' is there twice"),
-        ('name="left_elbow_pitch" type="revolute"', 'name="left_elbow_pitch" type="revolut"', "did you mean 'revolute'"),
+        ('name="left_elbow_pitch" type="revolute"', 'name="left_elbow_pitch" type="revolut"', "mean 'revolute'"),
         ('<parent link="left_elbow_link"/>', '<parent link="left_elbo_link"/>', "did you mean 'left_elbow_link'"),
         ('<child link="left_elbow_link"/>', "", "joint 'left_elbow_pitch' has no <child"),
         ('<origin xyz="0 0 -0.28" rpy="0 0 0"/>', '<origin xyz="0 0 -0,28" rpy="0 0 0"/>', "must be three numbers"),
@@ -105,7 +105,8 @@ def test_continuous_joints_turn_once_each_way(tmp_path: Path) -> None:
     assert (robot.lower[at], robot.upper[at]) == (-np.pi, np.pi)
 
 
-MJCF = """<mujoco><compiler angle="radian"/><worldbody><body name="torso" pos="0 0 1"><geom type="box" size=".1 .15 .2" pos="0 0 .2"/>
+MJCF = """<mujoco><compiler angle="radian"/><worldbody><body name="torso" pos="0 0 1">
+<geom type="box" size=".1 .15 .2" pos="0 0 .2"/>
 {arms}</body></worldbody><actuator><motor joint="left_elbow" ctrlrange="-1 1" forcerange="-9 9"/></actuator></mujoco>"""
 ARM = """<body name="{s}_upper" pos="0 {y} .4"><joint name="{s}_pitch" axis="0 1 0" range="-2.9 1.2"/>
 <joint name="{s}_roll" axis="1 0 0" range="{roll}"/><joint name="{s}_yaw" axis="0 0 1" range="-1.7 1.7"/>

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -14,13 +15,15 @@ import numpy as np
 import pytest
 
 from syda_gym.errors import MappingError, OptionError, RouteError, StorageError
-from syda_gym.evaluation.benchmark import BenchmarkConfig, compare, read_results, run_benchmark
+from syda_gym.evaluation import cell_files
+from syda_gym.evaluation.benchmark import BenchmarkConfig, compare, execution, read_results, run_benchmark
+from syda_gym.evaluation.benchmark import cells as cells_module
 from syda_gym.evaluation.benchmark.cells import cells_of
 from syda_gym.evaluation.benchmark.efficiency import efficiency_curve
-from syda_gym.evaluation.benchmark.pools import Schedule
 from syda_gym.evaluation.benchmark.report import write_benchmark_report
 from syda_gym.evaluation.benchmark.work import Worker, folds_of
 from syda_gym.evaluation.chains import Links, all_routes, check_route
+from syda_gym.evaluation.pools import InlinePool, Schedule
 from syda_gym.mappings.fitting.fit import METHODS, fit
 
 QUICK = {
@@ -34,32 +37,10 @@ QUICK = {
 @pytest.fixture
 def in_process(monkeypatch):
     """Computes cells in this process: as fast as can be, for tests of what surrounds the work."""
-    from syda_gym.evaluation.benchmark import execution, pools
-
-    class Here(pools.Pool):
-        size = 1
-
-        def __init__(self, motions):
-            pools._open(motions)
-            self.computed = 0
-
-        def submit(self, worker, cell):
-            self.computed += 1
-            return cell
-
-        def wait(self, tickets):
-            return tickets[0]
-
-        def outcome(self, ticket, cell):
-            return pools._compute(cell.to_dict())
-
-        def close(self):
-            pass
-
     opened = []
 
-    def make(workers, motions):
-        opened.append(Here(motions))
+    def make(workers, opener, *arguments):
+        opened.append(InlinePool(opener, *arguments))
         return opened[-1]
 
     monkeypatch.setattr(execution, "make_pool", make)
@@ -88,6 +69,11 @@ def computed(small_motions, tmp_path_factory):
         (f"agents: [{'x' * 5000}]", OptionError, "unknown agent 'xxx"),
         ("motions: 2026-99-99", StorageError, "not valid YAML"),
         ("disturbances: ['teleop:ful']", OptionError, "full"),
+        (
+            "efficiency: {chain: adult>kid>pepper, new_body: adult, draws: 1000000000000}",
+            OptionError,
+            "efficiency.draws must be at most 1000",
+        ),
         ("seeds: 1000000000000", OptionError, "at most 10000"),
         ("seeds: -1", OptionError, "list of whole numbers"),
         ("folds: 1", OptionError, "at least 2"),
@@ -192,7 +178,7 @@ def test_a_method_without_seed_gives_the_same_numbers_with_any(small_motions):
 
 def test_a_schedule_keeps_batches_together_and_hands_out_everything_once(small_motions):
     cells = cells_of(BenchmarkConfig.of({**QUICK, "methods": ["syda", "direct"], "seeds": 3}), small_motions)
-    schedule = Schedule(cells, 2)
+    schedule = Schedule(cells, 2, lambda cell: cell.batch)
     taken, last = [], [None, None]
     while True:
         worker = len(taken) % 2
@@ -246,6 +232,54 @@ def test_a_lost_cell_is_computed_again_to_the_same_bytes(computed, small_motions
     assert in_process[0].computed == 2
     assert (folder / "results.csv").read_bytes() == before
     assert not list((folder / "cells").glob(".*"))
+
+
+def test_cells_of_other_versions_or_other_code_are_computed_again(
+    computed, small_motions, tmp_path, in_process, monkeypatch
+):
+    folder = tmp_path / "copy"
+    shutil.copytree(computed[0], folder)
+    before = json.loads((folder / "benchmark.json").read_text())["versions"]
+    assert len(before["code"]) == 16
+    monkeypatch.setattr(cells_module, "made_by", lambda: "0123456789abcdef")  # as another version of anything would
+    results = run_benchmark(BenchmarkConfig.of(QUICK), folder, motions=small_motions)
+    assert in_process[0].computed == len(results.about["cells"]) == 6
+    assert not set(results.about["cells"]) & {path.stem for path in (computed[0] / "cells").glob("*.json")}
+
+
+@pytest.mark.parametrize("fault", ["swapped", "one figure changed", "emptied", "not JSON", "key of another"])
+def test_damaged_and_swapped_cells_are_noticed_and_computed_again(computed, small_motions, tmp_path, in_process, fault):
+    folder = tmp_path / "copy"
+    shutil.copytree(computed[0], folder)
+    wanted = (folder / "results.csv").read_bytes()
+    first, second = sorted((folder / "cells").glob("*.json"))[:2]
+    stored = json.loads(first.read_text())
+    if fault == "swapped":
+        content = first.read_bytes(), second.read_bytes()
+        first.write_bytes(content[1])
+        second.write_bytes(content[0])
+    elif fault == "one figure changed":
+        stored["content"]["rows"][0]["landmark_error"] += 0.01
+        first.write_text(json.dumps(stored))
+    elif fault == "key of another":
+        first.write_text(json.dumps({**stored, "key": second.stem}))
+    else:
+        first.write_text("{}" if fault == "emptied" else "nothing")
+    run_benchmark(BenchmarkConfig.of(QUICK), folder, motions=small_motions)
+    assert in_process[0].computed == (2 if fault == "swapped" else 1)
+    assert (folder / "results.csv").read_bytes() == wanted
+
+
+def test_another_bundle_under_the_same_name_makes_other_cells(small_motions, tmp_path):
+    from syda_gym.files import asset
+
+    keys = []
+    for name in ("adult-pepper-noise", "adult-pepper-full"):
+        for suffix in (".json", ".safetensors"):
+            shutil.copy(asset("agents", f"{name}{suffix}"), tmp_path / f"mine{suffix}")
+        settings = {**QUICK, "routes": ["adult>pepper"], "agents": [str(tmp_path / "mine")]}
+        keys.append({cell.key for cell in cells_of(BenchmarkConfig.of(settings), small_motions)})
+    assert not keys[0] & keys[1]
 
 
 RUN = """
@@ -321,10 +355,10 @@ def test_a_failed_cell_is_reported_with_its_trace_and_the_rest_goes_on(
 ):
     whole = Worker._episodes
 
-    def broken(self, cell, shown):
+    def broken(self, cell, shown, tell):
         if cell.method == "nearest" and len(cell.route) == 3:
             raise MappingError("no neighbours today")
-        return whole(self, cell, shown)
+        return whole(self, cell, shown, tell)
 
     monkeypatch.setattr(Worker, "_episodes", broken)
     results = run_benchmark(BenchmarkConfig.of(QUICK), tmp_path, motions=small_motions)
@@ -341,9 +375,7 @@ def test_a_failed_cell_is_reported_with_its_trace_and_the_rest_goes_on(
 
 
 def test_a_full_disk_loses_no_finished_cell(small_motions, tmp_path, in_process, monkeypatch):
-    from syda_gym.evaluation.benchmark import execution
-
-    whole, written = execution.write_json, []
+    whole, written = cell_files.write_json, []
 
     def full(path, value):
         if len(written) == 2:
@@ -351,18 +383,16 @@ def test_a_full_disk_loses_no_finished_cell(small_motions, tmp_path, in_process,
         written.append(path)
         return whole(path, value)
 
-    monkeypatch.setattr(execution, "write_json", full)
+    monkeypatch.setattr(cell_files, "write_json", full)
     with pytest.raises(StorageError, match="No space left"):
         run_benchmark(BenchmarkConfig.of(QUICK), tmp_path, motions=small_motions)
-    monkeypatch.setattr(execution, "write_json", whole)
+    monkeypatch.setattr(cell_files, "write_json", whole)
     run_benchmark(BenchmarkConfig.of(QUICK), tmp_path, motions=small_motions)
     assert in_process[-1].computed == 4
 
 
 def test_other_versions_and_unwritable_folders_are_refused(computed, small_motions, tmp_path, in_process):
     folder, _ = computed
-    import shutil
-
     copy = tmp_path / "copy"
     shutil.copytree(folder, copy)
     about = json.loads((copy / "benchmark.json").read_text())

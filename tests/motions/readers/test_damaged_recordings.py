@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import warnings
 from pathlib import Path
 
@@ -14,10 +15,9 @@ from hypothesis import strategies as st
 from syda_gym.errors import MotionError
 from syda_gym.motions import load_motions
 from syda_gym.motions.readers import text
-from syda_gym.motions.readers.bvh import read_bvh
-from syda_gym.motions.readers.kinect import read_kinect
-from syda_gym.motions.readers.mediapipe import read_mediapipe
-from syda_gym.motions.readers.openni import read_openni
+from syda_gym.motions.readers.bvh.read import read_bvh
+from syda_gym.motions.readers.dispatch import read_mediapipe
+from syda_gym.motions.readers.tables.read import read_kinect, read_openni
 from tests.motions import recordings as rec
 
 pytestmark = pytest.mark.filterwarnings("ignore::syda_gym.motions.readers.skeleton.MotionWarning")
@@ -54,7 +54,7 @@ def _short(value: object) -> str | None:
         (BVH[:-40], r"line \d+: \d+ numbers, the hierarchy has 51 channels; the file is truncated"),
         (BVH.replace("Frame Time: 0.0333333", "Frame Time: 0"), "frame time must be between"),
         (BVH.replace("OFFSET 29.000000 0.000000", "OFFSET 29.000000"), "OFFSET needs three numbers, got 2"),
-        (BVH.replace("CHANNELS 3 Zrotation", "CHANNELS 2 Zrotation"), "expected CHANNELS 3 with three rotations"),
+        (BVH.replace("CHANNELS 3 Zrotation", "CHANNELS 2 Zrotation"), "CHANNELS 3 with three rotations is usual"),
         (BVH.replace("-80.000000", "nan"), "a channel is not a number"),
         (BVH.replace("-80.000000", "1e999"), "the number is infinite"),
         (BVH.replace("-80.000000", "eighty"), "'eighty' is no number"),
@@ -62,7 +62,7 @@ def _short(value: object) -> str | None:
         (BVH.replace("LeftForeArm", "Gripper"), "joint LElbow is missing; it may be called LeftForearm"),
         (BVH.replace("Left", "A").replace("Right", "B"), "no arm found"),
         (BVH.replace("}", "", 1), r"MOTION comes too early, 1 braces are open|expected"),
-        ("timestamp,x,y\n1,2,3", "expected HIERARCHY; this is not a BVH file"),
+        ("timestamp,x,y\n1,2,3", "3 columns called timestamp, x, y: no joint is named"),
         ("", "is empty"),
     ],
     ids=_short,
@@ -76,14 +76,16 @@ def test_damaged_bvh(tmp_path: Path, content: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        (_replaced(KINECT, 5, KINECT[5][:300]), r"line 6: \d+ columns, expected 101 .*truncated"),
+        (
+            _replaced(KINECT, 5, KINECT[5][:300]),
+            r"line 6: \d+ columns, the lines before have 101; is the file truncated",
+        ),
         (_replaced(KINECT, 2, KINECT[2].replace(",2,", ",7,", 1)), "line 3: a tracking state is none of 0, 1 and 2"),
         (_replaced(KINECT, 2, "x" + KINECT[2]), "line 3, column 1: 'x8"),
         (_replaced(KINECT, 3, KINECT[1]), "line 4: time runs backward"),
-        ([KINECT[0]] * 6, "all frames have the same timestamp"),
         (KINECT[:1], "1 frames; expected at least two"),
         ([line.replace(",2,", ",0,") for line in KINECT], "is tracked in 0 % of the frames only .*line 1"),
-        ([",".join(["nan"] * 101)] * 3, "tracking state|timestamp"),
+        ([",".join(["nan"] * 101)] * 3, "no order of joints that is known"),
     ],
 )
 def test_damaged_kinect(tmp_path: Path, lines: list[str], message: str) -> None:
@@ -96,7 +98,7 @@ def test_damaged_kinect(tmp_path: Path, lines: list[str], message: str) -> None:
     ("lines", "message"),
     [
         (_replaced(OPENNI, 4, OPENNI[4][:100]), r"line 5: \d+ columns, the lines before have 60"),
-        (["1 2 3"], "line 1: 3 columns; expected"),
+        (["1 2 3"], "3 columns of numbers, which is no order of joints"),
         (
             _replaced(OPENNI, 1, OPENNI[1].replace(OPENNI[1].split()[0], "head", 1)),
             "line 2, column 1: 'head' is no number",
@@ -120,22 +122,23 @@ def _image_landmarks() -> str:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (JSON[:-200], "no valid JSON"),
+        (JSON[:-200], "not valid JSON.*truncated"),
         ("{}", "expected a list of frames"),
         ("[]", "no frames"),
-        ("[1, 2]", "frame 0: expected 33 landmarks, got int"),
-        ('[{"pose": []}]', "frame 0: expected a key 'pose_world_landmarks'"),
+        ("[1, 2]", "frame 0: expected landmarks, got int"),
+        ('[{"posture": []}]', "frame 0: expected a key 'pose_world_landmarks'"),
         ('[{"pose_landmarks": []}]', "only image landmarks"),
-        ("[[[0, 0, 0]]]", "frame 0: expected 33 landmarks, got 1|got 3"),
+        ("[[[0, 0, 0]]]", "1 points a frame, which is no order of joints"),
         (rec.json_text([[[0.0, 0.0]] * 33]), "frame 0, landmark 0: expected x, y, z"),
         (rec.json_text([[{"x": "left"}] * 33]), "frame 0, landmark 0"),
         (rec.json_text([[], []]), "is tracked in 0 % of the frames"),
+        (re.sub('"timestamp_ms": [0-9]+', '"timestamp_ms": 7', JSON), "all frames have the same timestamp"),
         (JSON.replace('"timestamp_ms": 40', '"timestamp_ms": "soon"'), "frame 1: timestamp_ms is no number"),
         (JSON.replace('"timestamp_ms": 40', '"number": 40'), "frame 1: the time is missing"),
         (JSON.replace('"timestamp_ms": 40', '"timestamp_ms": -40'), "frame 1: time runs backward"),
         (_image_landmarks(), "image landmarks .*dump pose_world_landmarks"),
-        ("[" * 100_000, "no valid JSON|nested too deeply"),
-        ('{"fps": "fast", "frames": []}', "fps must be a number"),
+        ("[" * 100_000, "nested too deeply"),
+        (rec.json_text({"fps": "fast", "frames": rec.mediapipe_json(3)}), "fps must be a number"),
     ],
 )
 def test_damaged_mediapipe(tmp_path: Path, content: str, message: str) -> None:
@@ -148,7 +151,7 @@ def test_damaged_mediapipe(tmp_path: Path, content: str, message: str) -> None:
     ("arrays", "message"),
     [
         ({"other": np.zeros(3)}, "expected an array"),
-        ({"landmarks": np.zeros((5, 17, 3))}, r"shape \(5, 17, 3\), expected \(N, 33, 3\)"),
+        ({"landmarks": np.zeros((5, 17, 3))}, "17 points a frame in landmarks, which make no person"),
         ({"landmarks": np.array([["a"]])}, "expected"),
         ({"landmarks": np.zeros((5, 33, 3)), "timestamps": np.zeros(4)}, r"timestamps have shape \(4,\) for 5 frames"),
         ({"landmarks": np.zeros((5, 33, 3)), "fps": np.array(0.0)}, "fps must be"),
@@ -168,10 +171,10 @@ def test_damaged_landmark_npz(tmp_path: Path, arrays: dict[str, np.ndarray], mes
     [
         ("clip.bvh", KINECT, None),  # a Kinect table with a wrong ending is still a Kinect table
         ("clip.csv", BVH, None),
-        ("clip.csv", "a,b\n1,2", "line 1: 2 columns, expected 101"),
+        ("clip.csv", "a,b\n1,2", "no line of numbers .* begins with 'a,b'"),
         ("clip.npz", "text", "no readable .npz"),
-        ("clip.json", "text", "no joint is named|no valid"),
-        ("clip.txt", "just some words", "line 1: 3 columns; expected"),
+        ("clip.json", "text", "no line of numbers .* begins with 'text'"),
+        ("clip.txt", "just some words", "no line of numbers .* begins with 'just some words'"),
     ],
     ids=_short,
 )

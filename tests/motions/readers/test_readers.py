@@ -11,10 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.motions import MotionClip, load_motions
-from syda_gym.motions.readers.bvh import read_bvh
+from syda_gym.motions.readers.bvh.read import read_bvh
 from syda_gym.motions.readers.joint_names import match_joints
-from syda_gym.motions.readers.kinect import KINECT_JOINTS, read_kinect
+from syda_gym.motions.readers.layouts import KINECT_JOINTS
 from syda_gym.motions.readers.skeleton import MotionWarning
+from syda_gym.motions.readers.tables.read import read_kinect
 from tests.motions import recordings as rec
 
 pytestmark = pytest.mark.filterwarnings("ignore::syda_gym.motions.readers.skeleton.MotionWarning")

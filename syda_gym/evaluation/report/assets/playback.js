@@ -79,14 +79,14 @@
       vec3 s = vec3(dot(model[0].xyz, model[0].xyz), dot(model[1].xyz, model[1].xyz), dot(model[2].xyz, model[2].xyz));
       normal = mat3(model) * (n / s); gl_Position = view * w; }`;
   const FRAGMENT = `precision mediump float; uniform vec4 colour; uniform float lit; uniform vec3 eye; varying vec3 normal; varying vec3 where;
-    void main() { vec3 n = normalize(normal), to = normalize(eye - where); vec3 sun = normalize(vec3(0.55, -0.35, 0.8));
+    void main() { vec3 n = normalize(normal), to = normalize(eye - where); vec3 sun = normalize(vec3(1.5, 0.9, 2.2));
       float light = 0.52 + 0.14 * n.z + 0.42 * max(dot(n, sun), 0.0);
       float shine = 0.16 * pow(max(dot(n, normalize(sun + to)), 0.0), 28.0);
       gl_FragColor = vec4(mix(colour.rgb, colour.rgb * light + shine, lit), colour.a); }`;
 
   const SAME = placed([0, 0, 0], [0, 0, 0, 1], [1, 1, 1]);
   // Projects along the sun's rays onto the floor.
-  const SHADOW = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, -0.55 / 0.8, 0.35 / 0.8, 0, 0, 0, 0, 0.004, 1]);
+  const SHADOW = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, -1.5 / 2.2, -0.9 / 2.2, 0, 0, 0, 0, 0.004, 1]);
 
   class Renderer {
     constructor(canvas) {
@@ -364,18 +364,19 @@
       this.readout.textContent = `${seconds.toFixed(2)} s` + (now === null ? "" : ` · error ${(now / 100).toFixed(1)} cm`);
       c.fillStyle = css(variable("--paper")); c.fillRect(0, 0, W, H);
       if (error.length) {
-        const top = 1.35 * Math.max(400, ...error, this.chain.bound || 0), x = (i) => error.length > 1 ? i / (error.length - 1) * W : W / 2;
+        const top = 1.1 * Math.max(400, ...error, this.chain.bound || 0), band = 18 * ratio, y = (e) => H - e / top * (H - band), x = (i) => error.length > 1 ? i / (error.length - 1) * W : W / 2;
         c.beginPath(); c.moveTo(0, H);
-        error.forEach((e, i) => c.lineTo(x(i), H - e / top * H));
+        error.forEach((e, i) => c.lineTo(x(i), y(e)));
         c.lineTo(W, H); c.closePath(); c.globalAlpha = 0.35; c.fillStyle = css(variable("--s0")); c.fill(); c.globalAlpha = 1;
-        c.beginPath(); error.forEach((e, i) => i ? c.lineTo(x(i), H - e / top * H) : c.moveTo(x(i), H - e / top * H));
+        c.beginPath(); error.forEach((e, i) => i ? c.lineTo(x(i), y(e)) : c.moveTo(x(i), y(e)));
         c.strokeStyle = css(variable("--s0")); c.lineWidth = 1.5 * ratio; c.stroke();
         c.font = `${11 * ratio}px system-ui, sans-serif`; c.fillStyle = css(variable("--soft"));
-        c.fillText(`landmark error, top = ${(top / 100).toFixed(0)} cm`, 6 * ratio, 13 * ratio);
+        // The words have a band of their own above the curve, so that the line of the bound strikes none of them through.
+        c.fillText(`landmark error, up to ${(Math.max(...error) / 100).toFixed(1)} cm`, 6 * ratio, 13 * ratio);
         if (this.chain.bound !== null) {
-          const y = H - this.chain.bound / top * H;
-          c.setLineDash([6 * ratio, 4 * ratio]); c.strokeStyle = css(variable("--warn")); c.beginPath(); c.moveTo(0, y); c.lineTo(W, y); c.stroke(); c.setLineDash([]);
-          c.textAlign = "right"; c.fillStyle = css(variable("--warn")); c.fillText(`bound ${(this.chain.bound / 100).toFixed(1)} cm`, W - 6 * ratio, y - 4 * ratio); c.textAlign = "left";
+          const at = y(this.chain.bound);
+          c.setLineDash([6 * ratio, 4 * ratio]); c.strokeStyle = css(variable("--warn")); c.beginPath(); c.moveTo(0, at); c.lineTo(W, at); c.stroke(); c.setLineDash([]);
+          c.textAlign = "right"; c.fillStyle = css(variable("--warn")); c.fillText(`bound ${(this.chain.bound / 100).toFixed(1)} cm`, W - 6 * ratio, 13 * ratio); c.textAlign = "left";
         }
       }
       const at = this.time / Math.max(1, this.figures[0].frames - 1) * W;

@@ -1,0 +1,1 @@
+"""Files of this library and of the paper, which say themselves whose joints they hold."""
