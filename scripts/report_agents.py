@@ -1,6 +1,7 @@
 """Turns a finished study (scripts/study_agents.py) into docs/study-agents-tables.md, agents.json and the pictures.
 
     python scripts/report_agents.py --study study --out docs
+    python scripts/report_agents.py --study study --validation    # only J on the validation motions, before the test
 
 Tables hold interquartile means over all episodes and seeds of a condition, with bootstrap intervals that redraw
 episodes and seeds within their action. Bars are ratios of means, with the least and the largest ratio of a seed beside
@@ -269,12 +270,39 @@ def learning_picture(study: Path, path: Path) -> None:
     plt.close(figure)
 
 
+def validation(study: Path, out: Path) -> None:
+    """Writes J on the validation motions, in the servo model, of every condition that is there; prints the table."""
+    conditions = ("base", "lead", "kalman", "predictor", "stack", "residual")
+    cells: dict[str, dict[str, dict[str, float]]] = {}
+    for folder in sorted(path.parent for path in study.glob("*/rivals.json")):
+        rivals = read_json(folder / "rivals.json")
+        found = {name: dict(rivals[name]["validation"]) for name in ("base", "lead", "kalman")}
+        for kind in conditions[3:]:
+            curves = [
+                read_json(path)["figures"]["validation_curve"] for path in sorted(folder.glob(f"{kind}-[0-9].json"))
+            ]
+            best = [min(curve, key=lambda point: float(point["J"])) for curve in curves]
+            if best:
+                found[kind] = {name: float(np.mean([point[name] for point in best])) for name in ("J", "jitter")}
+                found[kind]["seeds"] = len(best)
+        cells[folder.name] = found
+    write_json(out / "results" / "agents-validation.json", cells)
+    print(_row("cell", *conditions))
+    print("|---" * (len(conditions) + 1) + "|")
+    for name, found in cells.items():
+        print(_row(name, *(f"{found[kind]['J']:.2f}" if kind in found else "" for kind in conditions)))
+
+
 def main() -> None:
     """Writes the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--study", type=Path, default=Path("study"))
     parser.add_argument("--out", type=Path, default=Path("docs"))
+    parser.add_argument("--validation", action="store_true", help="only the validation motions")
     given = parser.parse_args()
+    if given.validation:
+        validation(given.study, given.out)
+        return
     cells = {
         (name, level): Cell(given.study, name, level)
         for name, level in CELLS
