@@ -25,6 +25,7 @@ from tests.test_docs import commands
 PARSED = {
     "syda-gym demo": "minutes; `make demo` in CI",
     "syda-gym train": "minutes; tests/agents/test_work.py",
+    "syda-gym tune": "minutes; tests/agents/test_work.py",
     "syda-gym benchmark study.yaml": "minutes to hours; tests/evaluation/test_benchmark.py",
     "syda-gym benchmark examples/paper_benchmark.yaml": "needs the paper's recordings; tests/evaluation",
     "syda-gym compare study other": "needs two benchmarks; tests/evaluation/test_benchmark.py",
