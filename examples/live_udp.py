@@ -19,7 +19,7 @@ from syda_gym.teleoperation.incoming.packets import encode_frame
 from syda_gym.teleoperation.outgoing.bullet import BulletSink
 
 seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 8.0
-mapping, _ = choose_mapping("adult", "pepper")
+mapping, notices = choose_mapping("adult", "pepper")  # your recordings, else unfitted
 
 
 def person(port: int, stop: threading.Event) -> None:
@@ -34,6 +34,7 @@ def person(port: int, stop: threading.Event) -> None:
             sock.sendto(encode_frame(number, time.monotonic(), 100.0 * frame), ("127.0.0.1", port))
 
 
+print(*notices, sep="\n")
 loop = TeleoperationLoop(mapping, LoopSettings(calibration=1.0))
 stop = threading.Event()
 with BulletSink(loop.robot) as robot, UdpSource(mapping.source, port=0) as source:

@@ -55,7 +55,7 @@ def main() -> None:
 
 
 def _fits(pair: PairedMotions) -> dict[str, float]:
-    fit(pair, epochs=1)  # imports torch and warms it up
+    fit(pair, preset="synergies", epochs=1)  # imports torch and warms it up
     variants = {
         "fit general with error bound [s]": {"preset": "general"},
         "fit general [s]": {"preset": "general", "confidence": False},

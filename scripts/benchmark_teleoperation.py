@@ -28,6 +28,8 @@ from typing import Any
 
 import numpy as np
 
+import syda_gym
+from syda_gym import unfitted
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
@@ -36,7 +38,7 @@ from syda_gym.files import read_json, write_json
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.motions.clip import MotionClip
 from syda_gym.motions.loading import load_motions
-from syda_gym.routes.choice import choose_mapping, geometric_mapping
+from syda_gym.routes.choice import choose_mapping
 from syda_gym.teleoperation import LoopSettings, TeleoperationLoop, Tick, UdpSink, UdpSource, run
 from syda_gym.teleoperation.incoming.inbox import Inbox
 from syda_gym.teleoperation.incoming.ordering import Ordering
@@ -75,7 +77,7 @@ def main() -> None:
 def chosen(args: argparse.Namespace) -> Mapping:
     """The mapping that the arguments name."""
     route = "auto" if args.route == "auto" else tuple(args.route.split(","))
-    return choose_mapping("adult", "pepper", mapping=args.mapping, route=route)[0]
+    return choose_mapping("adult", "pepper", mapping=args.mapping, route=route, motions="embedded")[0]
 
 
 def operator_frames(count: int) -> FloatArray:
@@ -168,9 +170,11 @@ def throughput(args: argparse.Namespace) -> dict[str, Any]:
     frames, standing = operator_frames(600), standing_frames(30.0)
     pair = load_motions("embedded", fps=5.0).pair("adult", "pepper")
     mappings = {
-        "syda adult>pepper": choose_mapping("adult", "pepper")[0],
-        "syda adult>kid>pepper": choose_mapping("adult", "pepper", route=("adult", "kid", "pepper"))[0],
-        "geometric": choose_mapping("adult", "pepper", mapping="geometric")[0],
+        "syda adult>pepper": choose_mapping("adult", "pepper", motions="embedded")[0],
+        "syda adult>kid>pepper": choose_mapping(
+            "adult", "pepper", route=("adult", "kid", "pepper"), motions="embedded"
+        )[0],
+        "geometric": unfitted(syda_gym.embodiment("adult"), syda_gym.embodiment("pepper")),
         "mink": fit(pair, method="mink"),
     }
     result: dict[str, Any] = {"load_average": os.getloadavg()[0]}
@@ -202,7 +206,7 @@ def violations(args: argparse.Namespace) -> dict[str, Any]:
         robot = catalog.get(robot_name)
         assert isinstance(robot, Robot)
         for label, clips in _recordings(args.data).items():
-            mapping = geometric_mapping(clips[0].body, robot)
+            mapping = unfitted(clips[0].body, robot)
             total = np.zeros(5, dtype=np.int64)
             for clip in clips:
                 times = (
@@ -210,7 +214,7 @@ def violations(args: argparse.Namespace) -> dict[str, Any]:
                 )
                 total += _count(mapping, robot, times, clip.frames)
             result[f"{label} > {robot_name}"] = _named(total)
-        fitted = choose_mapping("adult", robot_name)[0]
+        fitted = choose_mapping("adult", robot_name, motions="embedded")[0]
         walk = _random_walk(fitted.source, 20_000)
         result[f"random walk, {fitted.method} > {robot_name}"] = _named(
             _count(fitted, robot, np.arange(len(walk)) / 30.0, walk)

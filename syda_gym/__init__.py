@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from syda_gym.mappings.chain import ChainMapping
     from syda_gym.mappings.fitting.fit import fit
     from syda_gym.mappings.mapping import Mapping
+    from syda_gym.mappings.methods.unfitted import unfitted
     from syda_gym.mappings.storage import load_mapping, save_mapping
     from syda_gym.motions.clip import Motions, PairedMotions
     from syda_gym.motions.loading import load_motions
@@ -62,6 +63,7 @@ __all__ = [
     "save_mapping",
     "save_motions",
     "transferability",
+    "unfitted",
 ]
 
 ENV_ID = "SydaTeleop-v0"
@@ -87,6 +89,7 @@ _LAZY: dict[str, tuple[str, str]] = {
     "save_mapping": ("mappings.storage", "save_mapping"),
     "save_motions": ("motions.readers.own.npz", "save_motions"),
     "transferability": ("routes.metric", "transferability"),
+    "unfitted": ("mappings.methods.unfitted", "unfitted"),
 }
 
 

@@ -27,6 +27,7 @@ RECORDED = Path(__file__).with_name("behaviour.json")
 METHODS = (
     ("syda", "paper"),
     ("syda", "general"),
+    ("syda", "synergies"),
     ("direct", None),
     ("ridge", None),
     ("kernel_ridge", None),

@@ -33,6 +33,7 @@ PARSED = {
     "syda-gym reproduce-paper": "needs the paper's recordings; tests/evaluation/test_paper.py",
     "syda-gym transferability --validate": "minutes; tests/evaluation/test_prediction.py",
     "syda-gym route --operator adult --robot nao": "fits and plays every link; tests/transferability/test_measured.py",
+    "syda-gym fit": "needs recordings of a person; tests/routes/test_pilot.py",
     "syda-gym record": "needs a person; tests/teleoperation/test_recording.py",
     "syda-gym motions pair": "needs recordings of a person; tests/motions/test_session.py",
     "syda-gym teleop --source camera --view": "needs a camera; tests/teleoperation/incoming/test_camera.py",
@@ -42,7 +43,7 @@ PARSED = {
     "syda-gym robot add URDF --view": "shows until it is closed; tests/simulation/page/test_showing.py",
     "syda-gym teleop --robot nao --source udp:9870 --sink naoqi:tcp://nao.local:9559": "needs a robot; test_naoqi.py",
     "syda-gym teleop --source udp:9870 --sink window": "needs a screen",
-    "syda-gym teleop --robot my-robot --motions my-pairs --source udp:9870 --sink window": "needs a screen",
+    "syda-gym teleop --robot my-robot --source udp:9870 --sink window": "needs a screen",
 }
 # Beginning of a command -> options added to make it short; the last of two equal options counts.
 SHORTER = {

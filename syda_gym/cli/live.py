@@ -18,8 +18,9 @@ from syda_gym.cli.options import (
     MethodOption,
     ModelOption,
     MotionsOption,
+    NewRecordingOption,
     OperatorOption,
-    OutFolderOption,
+    OwnMotionsOption,
     PictureOption,
     PresetOption,
     RobotOption,
@@ -49,7 +50,7 @@ robot_app = Program(help="Add your own robot, look at it, list those that are kn
 
 @robot_app.command("add")
 def _robot_add(
-    urdf: Annotated[Path, typer.Argument(help="Any URDF, with primitives or meshes.")],
+    urdf: Annotated[Path, typer.Argument(help="Any URDF (or xacro, MJCF, or a description of yours).")],
     name: Annotated[str | None, typer.Option(help="The new name; by default the file's.")] = None,
     left: Annotated[str | None, typer.Option(help="Link at the end of the left arm, if the search is wrong.")] = None,
     right: Annotated[str | None, typer.Option(help="Link at the end of the right arm.")] = None,
@@ -68,16 +69,22 @@ def _robot_add(
     added = add_robot(urdf, name, left=left, right=right, torso=torso, replace_existing=replace)
     _print_robot(added.robot)
     say = console()
-    degrees = math.degrees(added.pointing_error)
+    verdict = added.verdict
+    colour = {"good": "green", "fair": "yellow", "doubtful": "red"}[verdict.word]
     say.print(
-        f"it points its limbs as a person does within {degrees:.1f} degrees on average (poses in front and beside)"
+        f"[{colour}]{verdict.word}[/]: it points its limbs as a person does within "
+        f"{math.degrees(verdict.error):.1f} degrees on average (upper arms "
+        f"{math.degrees(verdict.upper):.1f}, forearms {math.degrees(verdict.fore):.1f})"
     )
+    if verdict.reason:
+        say.print(f"likely reason: {verdict.reason}", markup=False)
     for notice in added.notices:
         say.print(f"- {notice}", markup=False)
     say_written("description", added.description, "(edit it if something is wrong)")
     say_written("picture", added.picture, "(the coloured arms must lie on the robot's)")
     say.print(
-        f"try it: syda-gym teleop --robot {added.robot.name} --method geometric --sink video:{added.robot.name}.mp4",
+        f"try it: syda-gym teleop --robot {added.robot.name} --method geometric --action wave_side --seconds 8 "
+        f"--sink video:{added.robot.name}.mp4",
         soft_wrap=True,
     )
     if suggest:
@@ -142,7 +149,7 @@ def teleop(
     preset: PresetOption = None,
     mapping: MappingOption = None,
     route: RouteOption = "auto",
-    motions: MotionsOption = "embedded",
+    motions: OwnMotionsOption = None,
     action: ActionOption = None,
     speed: Annotated[
         float, typer.Option(help="Speed of a replay.", callback=checks.between(0.0, 1000.0, open_low=True))
@@ -200,7 +207,8 @@ def teleop(
 
     say = console()
     leader, follower = ends_of(operator, robot, route)
-    stored_or_method, preset = mapping_of(method, preset, mapping)
+    named, preset = mapping_of(method, preset, mapping)
+    stored_or_method = named if method or preset or mapping else "auto"
     with say.status("choosing or fitting the mapping"):
         chosen, notices = choose_mapping(
             leader,
@@ -252,7 +260,7 @@ def teleop(
 
 
 def record(
-    out: OutFolderOption,
+    out: NewRecordingOption = None,
     operator: OperatorOption = None,
     robot: RobotOption = None,
     motions: MotionsOption = "embedded",
@@ -273,12 +281,14 @@ def record(
     Without `--action` one take of each action is played; without `--sink` a window shows the robot.
     """
     from syda_gym.motions import write_dataset
+    from syda_gym.motions.recordings import new_recording
     from syda_gym.teleoperation.addresses import make_sink, make_source, read_token
     from syda_gym.teleoperation.setup.record_session import RecordingOptions, choose_prompts, record_session
 
     say = console()
     performer, player = ends_of(operator, robot)
     clips, leader = choose_prompts(motions, player, performer, actions=action or (), takes=takes)
+    out = out or new_recording(leader.name, clips[0].body.name)
     token = read_token(token_file)
     listener = make_source(source, leader, token=token, calibration=calibration)
     options = RecordingOptions(calibration=calibration, axes=axes, countdown=countdown)
@@ -295,7 +305,7 @@ def record(
     show_table(("action", "takes", "frames", "lag [s]", "correlation", "verdict"), rows)
     for recording, reason in session.left_out.items():
         say.print(f"- {recording} left out: {reason}", markup=False)
-    say_written("written", out, f"(check it: syda-gym motions check {out})")
+    say_written("written", out, f"(check it: syda-gym motions check {out}, then: syda-gym fit {out})")
 
 
 class _Screen:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from syda_gym.cli import agents, benchmark, live, motions, routes, studies
+from syda_gym.cli import agents, benchmark, fit, live, motions, routes, studies
 from syda_gym.cli.shared import Interrupted, console
 from syda_gym.cli.spellings import Program
 from syda_gym.errors import SydaError
@@ -82,6 +82,7 @@ app.command()(agents.train)
 app.command()(agents.evaluate)
 app.command()(agents.play)
 app.command()(agents.export)
+app.command()(fit.fit)
 app.command()(live.teleop)
 app.command()(live.record)
 app.command()(benchmark.benchmark)

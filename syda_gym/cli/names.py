@@ -38,7 +38,7 @@ FORMATS = (
 """Prefixes of ``format:PATH``; see ``syda-gym motions formats``."""
 
 METHODS: dict[str, tuple[str, ...]] = {
-    "syda": ("general", "nested", "accurate", "interpolation", "paper"),
+    "syda": ("general", "synergies", "nested", "accurate", "interpolation", "paper"),
     "direct": ("general", "paper"),
     "ridge": ("general",),
     "kernel_ridge": ("general",),

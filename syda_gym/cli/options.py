@@ -49,8 +49,10 @@ __all__ = [
     "MethodsOption",
     "ModelOption",
     "MotionsOption",
+    "NewRecordingOption",
     "OperatorOption",
     "OutFolderOption",
+    "OwnMotionsOption",
     "PairOption",
     "PersonOption",
     "PhysicsHzOption",
@@ -85,6 +87,13 @@ _METHOD_HELP = "; ".join(
 
 MotionsOption = Annotated[str, typer.Option("--motions", "-m", help=f"Recordings: {_SPEC}", metavar="SPEC")]
 SpecArgument = Annotated[str, typer.Argument(help=f"A recording: {_SPEC}", metavar="SPEC")]
+OwnMotionsOption = Annotated[
+    str | None,
+    typer.Option("--motions", "-m", help=f"Fitted on; by default what you recorded: {_SPEC}", metavar="SPEC"),
+]
+NewRecordingOption = Annotated[
+    Path | None, typer.Option("--out", "-o", help="Folder of the data set; by default where `fit` and `teleop` look.")
+]
 OutFolderOption = Annotated[
     Path, typer.Option("--out", "-o", help="Folder to write to; created if need be.", callback=checks.folder)
 ]

@@ -25,7 +25,7 @@ def view_episode(played: PlayedEpisode, title: str, address: str, appearance: Pa
     from syda_gym.look import REFERENCE, ROBOT, rgba
     from syda_gym.simulation.page.plan import PlotPlan, body_plan
     from syda_gym.simulation.page.showing import Shown
-    from syda_gym.simulation.pictures.camera import OPERATOR_AT
+    from syda_gym.simulation.pictures.stage import OPERATOR_AT
 
     robot, operator = played.robot, played.operator
     errors = 1000.0 * np.linalg.norm(robot.landmarks(played.q) - robot.landmarks(played.reference), axis=-1)

@@ -8,14 +8,16 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from syda_gym import files
 from syda_gym.embodiments.embodiment import Embodiment
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.parametric import PARAMETRIC_HUMANS
+from syda_gym.embodiments.reading.source import ROBOT_ENDINGS
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import EmbodimentError, nearest_name
 from syda_gym.files import asset
 
-__all__ = ["from_spec", "get", "names", "register", "resolve", "user_folder"]
+__all__ = ["from_spec", "get", "is_robot_file", "names", "register", "resolve", "user_folder"]
 
 _makers: dict[str, Callable[[], Embodiment]] = {}
 
@@ -55,17 +57,28 @@ def get(name: str) -> Embodiment:
 
 
 def resolve(body: str | os.PathLike[str] | Embodiment) -> Embodiment:
-    """Accepts a body, its name, or the path of a robot description (``.yaml``) or of a URDF, whose arms are found."""
+    """Accepts a body, its name, or the path of a robot description (``.yaml``) or of a URDF, whose arms are found.
+
+    Raises:
+        EmbodimentError: an unknown name, or a file that is no robot.
+    """
     if isinstance(body, Embodiment):
         return body
     text = os.fspath(body)
-    if text.endswith((".yaml", ".yml")):
+    if text.lower().endswith((".yaml", ".yml")):
         return Robot.read(text)
-    if text.endswith(".urdf"):
+    if is_robot_file(text):
         from syda_gym.embodiments.discovery.arms import discover_robot
 
         return discover_robot(text)
     return get(text)
+
+
+def is_robot_file(body: object) -> bool:
+    """Whether something is the path of a robot's file or description, by its ending."""
+    if not isinstance(body, str | os.PathLike):
+        return False
+    return os.fspath(body).lower().endswith((*ROBOT_ENDINGS, ".yaml", ".yml"))
 
 
 def from_spec(spec: dict[str, Any]) -> Embodiment:
@@ -89,8 +102,7 @@ def from_spec(spec: dict[str, Any]) -> Embodiment:
 
 def user_folder() -> Path:
     """Where ``syda-gym robot add`` keeps descriptions: ``$SYDA_GYM_HOME/robots`` or ``~/.syda_gym/robots``."""
-    home = os.environ.get("SYDA_GYM_HOME")
-    return (Path(home) if home else Path.home() / ".syda_gym") / "robots"
+    return files.user_folder("robots")
 
 
 @lru_cache(maxsize=256)

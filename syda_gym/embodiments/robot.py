@@ -1,10 +1,11 @@
-"""Robot: a URDF with two arms, read by yourdfpy, its kinematics by pinocchio."""
+"""Robot: a URDF with one or two arms, its kinematics by pinocchio."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+import re
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -12,108 +13,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from syda_gym.embodiments.description import ArmDescription, CoupledLimit, RobotDescription
 from syda_gym.embodiments.embodiment import SIDES, Embodiment, Feature, FloatArray, Side
 from syda_gym.embodiments.kinematics.arm_chain import ArmChain
 from syda_gym.embodiments.kinematics.coupled import coupled_range
-from syda_gym.embodiments.kinematics.urdf import arm_chain, read_urdf
-from syda_gym.errors import EmbodimentError, nearest_name
-from syda_gym.files import fingerprint, read_yaml, shortened
+from syda_gym.embodiments.kinematics.urdf import UrdfTree, arm_chain, read_urdf
+from syda_gym.errors import EmbodimentError
+from syda_gym.files import fingerprint
 
 __all__ = ["ArmDescription", "CoupledLimit", "Robot", "RobotDescription"]
-
-
-@dataclass(frozen=True)
-class ArmDescription:
-    """Which links and joints of a URDF make one arm.
-
-    Attributes:
-        side: ``"left"`` or ``"right"``.
-        joints: revolute joints from shoulder to wrist, in order.
-        shoulder: link whose origin is the shoulder point.
-        elbow: link whose origin is the elbow point.
-        wrist: link whose origin is the wrist point.
-        tip: link whose origin ends the arm (for the workspace).
-    """
-
-    side: Side
-    joints: tuple[str, ...]
-    shoulder: str
-    elbow: str
-    wrist: str
-    tip: str
-
-
-@dataclass(frozen=True)
-class CoupledLimit:
-    """Limits of ``joint`` that depend on the angle of ``by``, linear between the rows ``at`` [rad]."""
-
-    joint: str
-    by: str
-    at: tuple[float, ...]
-    lower: tuple[float, ...]
-    upper: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class RobotDescription:
-    """The small hand-editable YAML beside a URDF: everything that the URDF alone does not say.
-
-    Attributes:
-        name: name in the catalog.
-        urdf: the URDF file.
-        torso: link in whose frame landmarks are expressed.
-        height: stature [m].
-        arms: one or two.
-        coupled_limits: limits that depend on another joint.
-        rest: joint name to angle [rad] of the pose to start from; 0 where absent.
-        disabled_collisions: pairs of links whose contact does not count.
-        axes: rows of the rotation from the torso link's frame to body axes (x forward, y left, z up); ``None`` if the
-            link has body axes already, as most do.
-    """
-
-    name: str
-    urdf: Path
-    torso: str
-    height: float
-    arms: tuple[ArmDescription, ...]
-    coupled_limits: tuple[CoupledLimit, ...] = ()
-    rest: Mapping[str, float] = field(default_factory=dict)
-    disabled_collisions: tuple[tuple[str, str], ...] = ()
-    axes: tuple[tuple[float, float, float], ...] | None = None
-
-    @classmethod
-    def read(cls, path: str | os.PathLike[str]) -> RobotDescription:
-        """Reads a description from YAML.
-
-        Raises:
-            EmbodimentError: missing file, unknown or missing keys; the message names them.
-        """
-        file = Path(path)
-        if not file.is_file():
-            raise EmbodimentError(f"no robot description {file}; write one with `syda-gym robot add URDF`")
-        data = read_yaml(file, "a robot description (YAML)", EmbodimentError)
-        needed = {"name", "urdf", "torso", "height", "arms"}
-        allowed = needed | {"coupled_limits", "rest", "disabled_collisions", "axes"}
-        if not isinstance(data, dict) or not needed <= set(data):
-            raise EmbodimentError(f"{file}: expected the keys {sorted(needed)}, got {shortened(data)}")
-        for key in set(data) - allowed:
-            raise EmbodimentError(f"{file}: unknown key {shortened(key)}; {nearest_name(shortened(key, 40), allowed)}")
-        try:
-            return cls(
-                name=str(data["name"]),
-                urdf=(file.parent / str(data["urdf"])).resolve(),
-                torso=str(data["torso"]),
-                height=float(data["height"]),
-                arms=tuple(_arm(a) for a in data["arms"]),
-                coupled_limits=tuple(_coupled_limit(c) for c in data.get("coupled_limits") or ()),
-                rest={str(k): float(v) for k, v in (data.get("rest") or {}).items()},
-                disabled_collisions=tuple((str(a), str(b)) for a, b in data.get("disabled_collisions") or ()),
-                axes=_rotation_rows(data["axes"]) if data.get("axes") else None,
-            )
-        except (TypeError, KeyError, ValueError, AttributeError, OverflowError) as error:
-            raise EmbodimentError(
-                f"{file}: a wrong value or key: {str(error)[:400]}; see docs for the format"
-            ) from error
 
 
 class Robot(Embodiment):
@@ -146,14 +54,15 @@ class Robot(Embodiment):
         arms = sorted(description.arms, key=lambda arm: SIDES.index(arm.side))
         self.sides = tuple(arm.side for arm in arms)
         tree = read_urdf(description.urdf)
+        for arm in arms:
+            _refuse_followers(tree, arm)
         self.joint_names = tuple(joint for arm in arms for joint in arm.joints)
         limits = tree.limits(self.joint_names)
         self.lower, self.upper = limits.lower, limits.upper
         self.speed, self.effort = limits.speed, limits.effort
         self.features = tuple(Feature(name, "rad") for name in self.joint_names)
         self.chains: tuple[ArmChain, ...] = tuple(
-            arm_chain(tree, description.torso, arm.side, arm.joints, (arm.shoulder, arm.elbow, arm.wrist, arm.tip))
-            for arm in arms
+            arm_chain(tree, description.torso, arm.side, arm.joints, arm.links, arm.point_offsets) for arm in arms
         )
         if description.axes is not None:
             turn = np.array(description.axes)
@@ -177,8 +86,19 @@ class Robot(Embodiment):
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Robot:
-        """Builds a robot from the YAML description at ``path``."""
-        return cls(RobotDescription.read(path))
+        """Builds a robot from the YAML description at ``path``.
+
+        Raises:
+            EmbodimentError: as the constructor; the message names the line that it is about.
+        """
+        description = RobotDescription.read(path)
+        try:
+            return cls(description)
+        except EmbodimentError as error:
+            line = _line_about(Path(path), str(error))
+            if not line:
+                raise
+            raise EmbodimentError(f"{path}, line {line}: {error}") from error
 
     @property
     def kind(self) -> Literal["human", "robot"]:
@@ -312,26 +232,28 @@ class Robot(Embodiment):
         }
 
 
-def _arm(entry: Any) -> ArmDescription:
-    arm = ArmDescription(**{**entry, "joints": tuple(entry["joints"])})
-    for name in (*arm.joints, arm.side, arm.shoulder, arm.elbow, arm.wrist, arm.tip):
-        if not isinstance(name, str):
-            raise ValueError(f"arms are described by names of joints and links, got {name!r}")
-    return arm
+def _refuse_followers(tree: UrdfTree, arm: ArmDescription) -> None:
+    """A joint that follows one of the arm's own would move elbow or wrist in ways that no chain of joints knows."""
+    if not arm.joints or arm.joints[0] not in tree.joints or arm.wrist not in tree.links():
+        return  # told by name where the chain is built
+    for name in tree.path_to(tree.joints[arm.joints[0]].parent, arm.wrist) or ():
+        mimic = None if tree.joints[name].type == "fixed" else tree.joints[name].mimic
+        if mimic is not None and mimic.multiplier and mimic.joint in arm.joints and name not in arm.joints:
+            raise EmbodimentError(
+                f"{tree.path.name}: joint {name!r} of the {arm.side} arm follows {mimic.joint!r} (<mimic>), and "
+                "arms are made of joints that move by themselves; make it fixed, or take its <mimic> away and name it "
+                "in `joints`"
+            )
 
 
-def _coupled_limit(entry: Any) -> CoupledLimit:
-    at, lower, upper = (tuple(float(value) for value in entry[key]) for key in ("at", "lower", "upper"))
-    if not 0 < len(at) == len(lower) == len(upper):
-        raise ValueError(f"at, lower and upper of a coupled limit need equally many numbers, got {entry}")
-    return CoupledLimit(str(entry["joint"]), str(entry["by"]), at, lower, upper)
-
-
-def _rotation_rows(value: Any) -> tuple[tuple[float, float, float], ...]:
-    rows = np.asarray(value, dtype=np.float64)
-    if rows.shape != (3, 3) or not np.allclose(rows @ rows.T, np.eye(3), atol=1e-6) or np.linalg.det(rows) < 0.0:
-        raise ValueError(f"axes must be the three rows of a rotation, got {value}")
-    return tuple((float(x), float(y), float(z)) for x, y, z in rows)
+def _line_about(path: Path, message: str) -> int:
+    """Line of a description that holds a name which an error puts in quotes, 0 if none does."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    for name in re.findall(r"'([^']+)'", message):
+        for number, line in enumerate(lines, start=1):
+            if not line.lstrip().startswith("#") and re.search(rf"(^|[\s\[,]){re.escape(name)}($|[\s\],}}])", line):
+                return number
+    return 0
 
 
 def _in_body_axes(chain: ArmChain, turn: FloatArray) -> ArmChain:

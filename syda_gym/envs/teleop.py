@@ -178,7 +178,7 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     | ``held_out`` | ``()`` | actions that no mapping may be fitted on |
     | ``via`` | ``None`` | bodies that routes may pass; the paper's adult, kid, pepper by default |
     | ``fit_seed`` | ``0`` | seed of fits |
-    | ``reference`` | ``"paired"`` | the robot's own motion, or ``mapped``: what the mapping makes of the operator |
+    | ``reference`` | ``"auto"`` | ``paired`` (the robot's own motion) where there is one, else ``mapped`` |
     | ``action_mode`` | ``"residual"`` | or ``position`` |
     | ``residual_scale`` | ``0.25`` | correction at action 1 [rad] |
     | ``preview``, ``history`` | ``0``, ``0`` | future and past frames in the observation |
@@ -194,6 +194,9 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     | ``render_mode`` | ``None`` | ``rgb_array``, ``rgb_array_list``, or ``human`` where there is a display |
 
     ``reset(options=...)`` takes ``motion`` (name or index of a clip), ``frame`` and ``route``.
+
+    A robot of which the motions hold nothing is driven by what you recorded of it (``syda-gym record``), else by the
+    unfitted mapping; a warning says which.
 
     Disturbances are off by default; ``syda_gym.envs.task.disturbances`` lists the cells (``lag``, ``noise``,
     ``latency``, ``noise+latency``, ``full``), the levels (``train``, ``test``, ``harsh``) and the single presets.

@@ -4,7 +4,7 @@ from syda_gym.files.archives import open_archive, read_arrays
 from syda_gym.files.budget import BUDGET, Budget, check_size, read_bytes, shortened
 from syda_gym.files.tensors import check_tensors
 from syda_gym.files.trees import parse_json, read_json, read_yaml
-from syda_gym.files.writing import asset, atomic_path, fingerprint, write_bytes, write_json, write_text
+from syda_gym.files.writing import asset, atomic_path, fingerprint, user_folder, write_bytes, write_json, write_text
 
 __all__ = [
     "BUDGET",
@@ -21,6 +21,7 @@ __all__ = [
     "read_json",
     "read_yaml",
     "shortened",
+    "user_folder",
     "write_bytes",
     "write_json",
     "write_text",

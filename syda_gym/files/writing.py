@@ -13,7 +13,7 @@ from typing import Any
 
 from syda_gym.errors import StorageError
 
-__all__ = ["asset", "atomic_path", "fingerprint", "write_bytes", "write_json", "write_text"]
+__all__ = ["asset", "atomic_path", "fingerprint", "user_folder", "write_bytes", "write_json", "write_text"]
 
 ASSETS = Path(__file__).parents[1] / "assets"
 
@@ -21,6 +21,12 @@ ASSETS = Path(__file__).parents[1] / "assets"
 def asset(*parts: str) -> Path:
     """Returns the path of a file shipped with the package, for example ``asset("robots", "pepper.yaml")``."""
     return ASSETS.joinpath(*parts)
+
+
+def user_folder(*parts: str) -> Path:
+    """A folder of this user's own: ``$SYDA_GYM_HOME`` or ``~/.syda_gym``, and ``parts`` below it; need not exist."""
+    home = os.environ.get("SYDA_GYM_HOME")
+    return (Path(home) if home else Path.home() / ".syda_gym").joinpath(*parts)
 
 
 @contextmanager

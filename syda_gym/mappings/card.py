@@ -34,6 +34,7 @@ class MappingCard:
         inverted: whether this is the inverse of the fitted direction.
         options: options given to ``fit``.
         versions: of Python and of the packages that matter for the numbers.
+        note: what a person should know of it in a few words: that it has no error bound, and why; often empty.
         format: layout of the card.
     """
 
@@ -50,7 +51,13 @@ class MappingCard:
     inverted: bool = False
     options: dict[str, Any] = field(default_factory=dict)
     versions: dict[str, str] = field(default_factory=dict)
+    note: str = ""
     format: int = CARD_FORMAT
+
+    @property
+    def unfitted(self) -> bool:
+        """Whether no recording went into the mapping."""
+        return self.rows == 0
 
     def to_json(self) -> dict[str, Any]:
         """The card as JSON-able values."""

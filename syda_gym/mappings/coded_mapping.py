@@ -88,21 +88,30 @@ class CodedMapping(Mapping):
         Raises:
             MappingError: the mapping was fitted without a bound.
         """
-        confidence = self._confidence()
-        if confidence.bound is None:
+        frames = self.source.check(frames)
+        bound = None if self._card.unfitted else self._confidence().bound
+        if bound is None:
             raise MappingError(
                 f"{self!r} has no error bound: it takes at least two actions to hold one out; "
                 "fit on recordings of more actions"
             )
-        return np.full(len(self.source.check(frames)), confidence.bound)
+        return np.full(len(frames), bound)
 
     def difficulty(self, frames: ArrayLike) -> FloatArray:
-        """Distance from the frames of the fit, 0 to 1, ``(N,)``."""
+        """Distance from the frames of the fit, 0 to 1, ``(N,)``; 0 where nothing was fitted."""
+        if self._card.unfitted:
+            return np.zeros(len(self.source.check(frames)))
         return self._confidence().difficulty(self.source_coder.encode(self.source.check(frames)))
 
     def unfamiliar(self, frames: ArrayLike) -> NDArray[np.bool_]:
-        """Which frames are out of the distribution of the fit, ``(N,)``."""
+        """Which frames are out of the distribution of the fit, ``(N,)``; none where nothing was fitted."""
+        if self._card.unfitted:
+            return np.zeros(len(self.source.check(frames)), dtype=bool)
         return self._confidence().unfamiliar(self.source_coder.encode(self.source.check(frames)))
+
+    def __repr__(self) -> str:
+        note = f", {self._card.note}" if self._card.note else ""
+        return f"{super().__repr__()[:-1]}{note})"
 
     def _one(self, frame: FloatArray) -> FloatArray:
         mapped = self._single(frame) if self._single is not None else None

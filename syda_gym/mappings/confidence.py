@@ -19,6 +19,8 @@ _ANCHORS = 200
 _QUANTILE = 0.9
 _FAMILIAR = 0.99
 _LARGEST_BOUND = 10.0  # m
+_NEXT_ACTION = 0.95
+_LONGEST = 20.0  # of a logarithm; nothing is farther
 
 
 class Confidence:
@@ -29,8 +31,9 @@ class Confidence:
     actions badly, because errors differ between actions more than within them.
 
     The difficulty of a frame is 1 - k(frame, nearest anchor), k being a Gaussian kernel on standardised codes and the
-    anchors a spread-out subset of the training codes. Frames beyond the 99 % quantile of what held-out actions show are
-    out of distribution.
+    anchors a spread-out subset of the training codes. Frames farther than 95 % of further
+    actions would reach with all but 1 % of their frames (as the training actions tell of each other) are out of
+    distribution; with one action, which tells nothing of others, no frame is.
 
     Args:
         bound: error bound [m], ``None`` where no action could be held out.
@@ -117,15 +120,30 @@ def fit_confidence(codes: FloatArray, actions: NDArray[np.str_], bound: float | 
     anchors = _spread_out(standard, _ANCHORS)
     names = np.unique(labels)
     if len(names) > 1:
-        held_out = np.concatenate(
-            [_nearest(standard[labels == name], _spread_out(standard[labels != name], _ANCHORS)) for name in names]
-        )
+        apart = [_nearest(standard[labels == name], _spread_out(standard[labels != name], _ANCHORS)) for name in names]
+        held_out, far = np.concatenate(apart), _farthest(apart)
     else:
-        held_out = _nearest(standard, anchors)
+        # Its own frames lie on the anchors: how far another action would be is anyone's guess, so none is flagged.
+        held_out, far = np.linalg.norm(standard - standard.mean(axis=0), axis=1), np.inf
     width = max(float(np.median(held_out)), 1e-3)
-    far = float(np.quantile(held_out, _FAMILIAR))
     threshold = float(1.0 - np.exp(-0.5 * (max(far, 1e-3) / width) ** 2))
-    return Confidence(bound, enlargement, scale, anchors, width, min(threshold, 1.0 - 1e-9))
+    return Confidence(
+        bound, enlargement, scale, anchors, width, threshold if far == np.inf else min(threshold, 1 - 1e-9)
+    )
+
+
+def _farthest(apart: list[FloatArray]) -> float:
+    """How far frames of one more action may lie: a one-sided prediction limit over actions.
+
+    Actions differ more than the frames of one, and few actions say little about the next. So each action's own 99 %
+    quantile of distances (log) is one observation, and Student's t tells where the next one may be.
+    """
+    from scipy.stats import t
+
+    logs = np.log([max(float(np.quantile(distances, _FAMILIAR)), 1e-3) for distances in apart])
+    count = len(logs)
+    beyond = float(t.ppf(_NEXT_ACTION, count - 1)) * float(logs.std(ddof=1)) * np.sqrt(1.0 + 1.0 / count)
+    return float(np.exp(min(logs.mean() + beyond, _LONGEST)))
 
 
 def _within(name: str, value: Any, low: float, high: float) -> float:

@@ -19,13 +19,13 @@ from syda_gym.mappings.coding import arm_coders, mink_ik, window_coder
 from syda_gym.mappings.coding.coders import Coder, restore_coder
 from syda_gym.mappings.confidence import Confidence
 from syda_gym.mappings.mapping import Mapping
-from syda_gym.mappings.models import heads, hop, linear, rotation
+from syda_gym.mappings.models import heads, hop, linear, prior, rotation
 from syda_gym.mappings.models.regressors import Regressor, restore_regressor
 
 __all__ = ["load_mapping", "save_mapping"]
 
 # Importing these enters their coders and models among those that can be rebuilt.
-_PARTS = (arm_coders, mink_ik, window_coder, heads, hop, linear, rotation)
+_PARTS = (arm_coders, mink_ik, window_coder, heads, hop, linear, prior, rotation)
 
 _MAX_BYTES = 256 * 2**20
 _MOST_LINKS = 16

@@ -1,9 +1,12 @@
-"""Pilot: operator frames to base commands along a route, whatever ``mapping=`` and ``route=`` say."""
+"""Pilot: a mapping from body to body, whatever ``mapping=`` and ``route=`` say; the one road to it.
+
+Environments, benchmarks and the live loop all ask here. What was recorded decides; where nothing was, the unfitted
+mapping serves, and a notice says so.
+"""
 
 from __future__ import annotations
 
 import os
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,18 +16,18 @@ import numpy as np
 
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment
-from syda_gym.errors import MappingError, OptionError, RouteError, StorageError, SydaError, nearest_name
-from syda_gym.files import asset, read_json
+from syda_gym.errors import MappingError, OptionError, RouteError, SydaError, nearest_name
 from syda_gym.motions.clip import Motions
 
 if TYPE_CHECKING:
     from syda_gym.mappings.mapping import Mapping
+    from syda_gym.routes.links import Links
     from syda_gym.routes.route import Route
 
-__all__ = ["FIT_FPS", "Pilot", "PlannedRoute"]
+__all__ = ["AUTO", "Pilot", "PlannedRoute"]
 
-FIT_FPS = 10.0
-"""Mappings are fitted on frames at most this dense; neighbours at 30 Hz are near-duplicates."""
+AUTO = "auto"
+"""As ``mapping=``: this user's stored mapping, else a fit of what was recorded, else the unfitted mapping."""
 
 _MAX_HOPS = 2
 _PAPER_BODIES = ("adult", "kid", "pepper")
@@ -52,26 +55,31 @@ class Pilot:
     """Finds or fits the mappings of a route and chains them.
 
     Args:
-        motions: the data set.
+        motions: the data set; ``None`` for what this user recorded (``syda-gym record`` and ``syda-gym fit``).
         operator: who leads.
         robot: who follows.
-        mapping: a method of ``mappings.METHODS`` (shipped mappings are used where they were fitted to the same frames,
-            otherwise one is fitted), a ``Mapping`` from operator to robot, or a folder of stored mappings.
+        mapping: ``auto``; a method of ``mappings.METHODS`` (shipped mappings are used where they were fitted to the
+            same frames, otherwise one is fitted); a ``Mapping`` from operator to robot; or a folder of stored mappings.
         preset: of the method.
         held_out: actions that no fit may see.
-        via: bodies that a route may pass; by default those of the paper that the motions hold.
+        via: bodies that a route may pass; by default those of the paper that the motions hold, or all that this user
+            recorded.
         seed: of fits.
+
+    Attributes:
+        notices: what a person should know about the choice, a line each.
 
     Raises:
         OptionError: unknown method, a folder without mappings, held-out actions that do not exist.
         MappingError: a mapping between other bodies.
+        EmbodimentError: unknown bodies, or bodies without an arm that could drive or be driven.
     """
 
     def __init__(
         self,
-        motions: Motions,
-        operator: str,
-        robot: str,
+        motions: Motions | None,
+        operator: str | Embodiment,
+        robot: str | Embodiment,
         *,
         mapping: str | os.PathLike[str] | Mapping = "syda",
         preset: str | None = None,
@@ -81,34 +89,31 @@ class Pilot:
     ) -> None:
         from syda_gym.mappings.mapping import Mapping
 
-        self.motions, self.operator, self.robot = motions, operator, robot
-        self.preset, self.held_out, self.seed = preset, tuple(sorted(held_out)), seed
+        self.motions = motions
+        self.operator, self.robot = (_name(body) for body in (operator, robot))
+        self.notices: tuple[str, ...] = ()
+        self._ends = [body if isinstance(body, Embodiment) else self._found(body) for body in (operator, robot)]
         self._given: Mapping | None = None
-        self._stored: dict[tuple[str, str], Mapping] = {}
+        self._links: Links | None = None
         self._chains: dict[tuple[str, ...], Mapping] = {}  # finding a fit again takes a hash of all its frames
-        self._method = ""
-        for body in via or ():
-            if body not in motions.bodies:
-                raise OptionError(f"via: {motions.name} has no body {body!r}; {nearest_name(body, motions.bodies)}")
-        self._check_held_out()
+        if motions is not None:
+            self._check(motions, via, held_out)
         if isinstance(mapping, Mapping):
             self._take(mapping)
         elif isinstance(mapping, str | os.PathLike) and Path(mapping).is_dir():
-            self._stored = _read_folder(Path(mapping))
+            from syda_gym.routes.links import StoredLinks
+
+            self._links = StoredLinks(Path(mapping))
         else:
-            self._method = _method(mapping)
-        default = tuple(body for body in _PAPER_BODIES if body in motions.bodies)
-        self._via = tuple(dict.fromkeys((operator, *(default if via is None else via), robot)))
+            self._choose(_method(mapping), preset, tuple(held_out), via, seed)
 
     @property
     def fitted(self) -> tuple[tuple[str, str], ...]:
         """Pairs with a mapping, or with frames from which one can be fitted, in the directions that work."""
         if self._given is not None:
             return ((self._given.source.name, self._given.target.name),)
-        if self._stored:
-            return tuple(self._stored)
-        found = [pair for pair in self.motions.pairs if set(pair) <= set(self._via)]
-        return tuple([*found, *((b, a) for a, b in found)])
+        assert self._links is not None
+        return self._links.edges
 
     def plan(self, route: str | Sequence[str]) -> tuple[PlannedRoute, ...]:
         """The routes that an environment may take.
@@ -120,15 +125,12 @@ class Pilot:
         Raises:
             RouteError: unknown bodies, a missing link, or ends that are not operator and robot.
         """
-        if self._given is not None:
-            bodies = self._given.route
-            if not isinstance(route, str) and tuple(route) != bodies:
-                raise RouteError(f"the given mapping takes the route {bodies}; drop route={tuple(route)}")
-            return (self._planned(bodies),)
         if not isinstance(route, str):
             return (self._planned(self._explicit(route)),)
         if route not in ("auto", "sample"):
             raise RouteError(f"route must be 'auto', 'sample' or names of bodies, got {route!r}")
+        if self._given is not None:
+            return (self._planned(self._given.route),)
         routes = self._ranked()
         return tuple(PlannedRoute(r.bodies, float(r.T)) for r in (routes if route == "sample" else routes[:1]))
 
@@ -138,15 +140,50 @@ class Pilot:
 
         if self._given is not None:
             return self._given
+        assert self._links is not None
         route = tuple(bodies)
         if route not in self._chains:
-            links = [self._link(a, b) for a, b in zip(route[:-1], route[1:], strict=True)]
+            links = [self._links.link(a, b) for a, b in zip(route[:-1], route[1:], strict=True)]
             self._chains[route] = links[0] if len(links) == 1 else ChainMapping(links)
         return self._chains[route]
 
     def __getstate__(self) -> dict[str, object]:
         # Mappings are found again where the pilot is unpickled; they are larger than everything else together.
         return {**self.__dict__, "_chains": {}}
+
+    def _choose(
+        self, method: str | None, preset: str | None, held_out: tuple[str, ...], via: Sequence[str] | None, seed: int
+    ) -> None:
+        """Links from the motions if they lead to the robot, else this user's own, else the unfitted mapping."""
+        from syda_gym.routes.links import OwnLinks, RecordedLinks
+
+        motions = self.motions
+        if motions is not None:
+            default = tuple(body for body in _PAPER_BODIES if body in motions.bodies)
+            among = tuple(dict.fromkeys((self.operator, *(default if via is None else via), self.robot)))
+            recorded = RecordedLinks(motions, method or "syda", preset, held_out, seed, among)
+            if _connected(recorded.edges, self.operator, self.robot):
+                self._links = recorded
+                return
+        elif method == "geometric" and preset is None:  # asked for by name: what needs no recordings
+            self._take_unfitted()
+            return
+        own = OwnLinks(method, preset, seed)
+        if _connected(own.edges, self.operator, self.robot):
+            self._links = own
+            where = "" if motions is None else f"{motions.name} holds no recordings of {self.robot}: "
+            self.notices = (f"{where}your recordings of {self.operator} and {self.robot} are used", *own.notices)
+            return
+        self._take_unfitted()
+        self.notices = (
+            f"no recordings of you with {self.robot}: unfitted; `syda-gym record` improves it",
+            *own.notices,
+        )
+
+    def _take_unfitted(self) -> None:
+        from syda_gym.mappings.methods.unfitted import unfitted
+
+        self._given = unfitted(*self._ends)
 
     def _take(self, mapping: Mapping) -> None:
         ends = (mapping.source.name, mapping.target.name)
@@ -157,38 +194,53 @@ class Pilot:
             )
         self._given = mapping
 
-    def _check_held_out(self) -> None:
-        known = {take.action for take in self.motions.takes}
-        for action in self.held_out:
+    def _check(self, motions: Motions, via: Sequence[str] | None, held_out: Sequence[str]) -> None:
+        for body in via or ():
+            if body not in motions.bodies:
+                raise OptionError(f"via: {motions.name} has no body {body!r}; {nearest_name(body, motions.bodies)}")
+        known = {take.action for take in motions.takes}
+        for action in held_out:
             if action not in known:
                 raise OptionError(f"held_out: unknown action {action!r}; {nearest_name(action, known)}")
-        if known <= set(self.held_out):
+        if known <= set(held_out):
             raise OptionError("held_out names every action; at least one must be left to fit on")
 
     def _explicit(self, route: Sequence[str]) -> tuple[str, ...]:
         bodies = tuple(route)
+        if self._given is not None and bodies == self._given.route:
+            return bodies
         if len(bodies) < 2 or (bodies[0], bodies[-1]) != (self.operator, self.robot):
             raise RouteError(f"route {bodies} must lead from operator {self.operator!r} to robot {self.robot!r}")
         if len(set(bodies)) != len(bodies):
             raise RouteError(f"route {bodies} passes a body twice")
-        known = list(self._stored) or [pair for a, b in self.motions.pairs for pair in ((a, b), (b, a))]
+        if self._given is not None and self._given.card.rows:
+            raise RouteError(f"the given mapping takes the route {self._given.route}; drop route={bodies}")
+        known = self.fitted
         named = {name for pair in known for name in pair}
         for name in bodies:
-            if name not in named:
+            if named and name not in named:
                 words = ">".join(bodies)
                 raise RouteError(f"route {words}: no mapping leads from or to {name!r}; {nearest_name(name, named)}")
         for link in zip(bodies[:-1], bodies[1:], strict=True):
-            if link not in known:
+            if link not in known or self._given is not None:
                 pairs = ", ".join(f"{a}>{b}" for a, b in known)
-                raise RouteError(f"route {bodies}: no mapping for the link {link[0]}>{link[1]}; there are {pairs}")
+                own = (
+                    ""
+                    if self.motions is not None
+                    else "; or name motions that hold it, such as the synthetic 'embedded'"
+                )
+                raise RouteError(
+                    f"route {bodies}: no mapping for the link {link[0]}>{link[1]}; there are {pairs or 'none'}{own}"
+                )
         return bodies
 
     def _ranked(self) -> list[Route]:
         from syda_gym.routes.routing import ranked_routes
 
-        ends = [self.motions.bodies.get(name, name) for name in (self.operator, self.robot)]
         pairs = [(self._body(a), self._body(b)) for a, b in self.fitted]
-        return ranked_routes(ends[0], ends[1], pairs, max_hops=_MAX_HOPS, directed=True)
+        return ranked_routes(
+            self._body(self.operator), self._body(self.robot), pairs, max_hops=_MAX_HOPS, directed=True
+        )
 
     def _planned(self, bodies: tuple[str, ...]) -> PlannedRoute:
         from syda_gym.routes.routing import BodyGraph
@@ -201,86 +253,37 @@ class Pilot:
             return PlannedRoute(bodies, float(np.nan))
 
     def _body(self, name: str) -> Embodiment:
-        return self.motions.bodies[name] if name in self.motions.bodies else catalog.get(name)
+        for end in self._ends:
+            if self._links is None and end.name == name:
+                return end
+        return self._found(name) if self._links is None else self._links.body(name)
 
-    def _link(self, a: str, b: str) -> Mapping:
-        if self._stored:
-            return self._stored[a, b]
-        return _fitted_link(self.motions, a, b, self._method, self.preset, self.held_out, self.seed)
-
-
-_fits: OrderedDict[tuple[object, ...], Mapping] = OrderedDict()
-_MAX_FITS = 64
-
-
-def _fitted_link(
-    motions: Motions, a: str, b: str, method: str, preset: str | None, held_out: tuple[str, ...], seed: int
-) -> Mapping:
-    """Loads the shipped mapping if it was fitted to these frames, otherwise fits one; kept within the process."""
-    from syda_gym.mappings.fitting.fit import METHODS, fit
-    from syda_gym.motions.loading import resampled
-
-    chosen = preset or METHODS[method].default
-    pair = motions.pair(a, b)
-    key = (pair.fingerprint, a, b, method, chosen, held_out, seed)
-    if key in _fits:
-        _fits.move_to_end(key)
-        return _fits[key]
-    sparse = resampled(motions, FIT_FPS).pair(a, b) if pair.fps > FIT_FPS else pair
-    data = sparse.without_actions(held_out) if held_out else sparse
-    marks = {data.fingerprint} if held_out else {data.fingerprint, pair.fingerprint}
-    found = _shipped(a, b, method, chosen, marks) if seed == 0 else None
-    _fits[key] = found or fit(data, method=method, preset=chosen, seed=seed)
-    while len(_fits) > _MAX_FITS:
-        _fits.popitem(last=False)
-    return _fits[key]
+    def _found(self, name: str) -> Embodiment:
+        if self.motions is not None and name in self.motions.bodies:
+            return self.motions.bodies[name]
+        return catalog.get(name)
 
 
-def _shipped(a: str, b: str, method: str, preset: str, data: set[str]) -> Mapping | None:
-    """A mapping of the package that was fitted to the same frames by the same method."""
-    from syda_gym.mappings.storage import load_mapping
-
-    for path in sorted(asset("mappings").glob("*.json")):
-        links = read_json(path).get("links", [])
-        if len(links) != 1:
-            continue
-        card = links[0]["card"]
-        if (card["method"], card["preset"]) != (method, preset):
-            continue
-        ends = (card["source"]["name"], card["target"]["name"])
-        if ends == (a, b) and card["data"] in data:
-            return load_mapping(path)
-    return None
+def _name(body: str | Embodiment) -> str:
+    return body.name if isinstance(body, Embodiment) else body
 
 
-def _read_folder(folder: Path) -> dict[tuple[str, str], Mapping]:
-    """Every stored mapping of a folder, and the inverses of those that have one where nothing else serves."""
-    from syda_gym.mappings.storage import load_mapping
-
-    paths = sorted(folder.glob("*.safetensors"))
-    if not paths:
-        raise StorageError(f"{folder} holds no mapping (*.safetensors with *.json); fit and save some first")
-    found: dict[tuple[str, str], Mapping] = {}
-    inverses: dict[tuple[str, str], Mapping] = {}
-    for path in paths:
-        mapping = load_mapping(path)
-        ends = (mapping.source.name, mapping.target.name)
-        if ends in found:
-            raise StorageError(f"{folder} holds two mappings from {ends[0]!r} to {ends[1]!r}; keep one")
-        found[ends] = mapping
-        try:
-            inverses[ends[1], ends[0]] = mapping.inverse()
-        except MappingError:
-            continue
-    return {**inverses, **found}
+def _connected(edges: Sequence[tuple[str, str]], start: str, end: str) -> bool:
+    """Whether a route of at most two links leads from one body to another."""
+    if (start, end) in edges:
+        return True
+    return any(a == start and (b, end) in edges for a, b in edges)
 
 
-def _method(mapping: object) -> str:
+def _method(mapping: object) -> str | None:
+    """The method's name, ``None`` for ``auto``."""
     from syda_gym.mappings.fitting.fit import METHODS
 
+    if mapping == AUTO:
+        return None
     if not isinstance(mapping, str) or mapping not in METHODS:
         raise OptionError(
             f"mapping={mapping!r} is no method, no Mapping and no folder of mappings; "
-            f"{nearest_name(str(mapping), METHODS)}"
+            f"{nearest_name(str(mapping), [AUTO, *METHODS])}"
         )
     return mapping

@@ -9,6 +9,7 @@ import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.kinematics.arm_chain import ArmChain
+from syda_gym.embodiments.kinematics.urdf import configuration, read_urdf
 from syda_gym.embodiments.robot import Robot
 
 __all__ = ["ArmCapsules", "BoxObstacle", "CapsuleObstacle", "Shapes", "read_shapes"]
@@ -79,18 +80,21 @@ def read_shapes(robot: Robot) -> Shapes:
     """
     import pinocchio
 
-    model = pinocchio.buildModelFromUrdf(str(robot.urdf))
-    folders = [str(folder) for folder in robot.urdf.parents[:5]]
-    shapes = pinocchio.buildGeomFromUrdf(model, str(robot.urdf), pinocchio.GeometryType.COLLISION, package_dirs=folders)
+    tree = read_urdf(robot.urdf)
+    model = tree.model
+    shapes = pinocchio.buildGeomFromUrdfString(model, tree.xml, pinocchio.GeometryType.COLLISION)
     data = model.createData()
-    pinocchio.framesForwardKinematics(model, data, _rest(model, robot))
+    pinocchio.framesForwardKinematics(model, data, configuration(tree, robot.description.rest))
     pinocchio.updateFramePlacements(model, data)
-    torso = data.oMf[model.getFrameId(robot.description.torso)]
+    torso = data.oMf[model.getFrameId(robot.description.torso)].copy()
+    if robot.description.axes is not None:
+        torso.rotation = torso.rotation @ np.array(robot.description.axes).T
+    arm_joints = {tree.model_joints[name]: name for name in robot.joint_names}
     carried: list[list[tuple[int, str, _Capsule]]] = [[] for _ in robot.chains]
     capsules, boxes = [], []
     for shape in shapes.geometryObjects:
         link = model.frames[shape.parentFrame].name
-        arm, joint = _carrier(robot, model.names[shape.parentJoint])
+        arm, joint = _carrier(robot, arm_joints.get(model.names[shape.parentJoint], ""))
         if arm is not None:
             placement = shape.placement
             carried[arm] += [
@@ -108,16 +112,6 @@ def read_shapes(robot: Robot) -> Shapes:
         _on_arm(chain, part, items) for chain, part, items in zip(robot.chains, robot.arm_slices, carried, strict=True)
     )
     return Shapes(arms, tuple(capsules), tuple(boxes))
-
-
-def _rest(model: Any, robot: Robot) -> FloatArray:
-    import pinocchio
-
-    configuration: FloatArray = pinocchio.neutral(model)
-    for name, angle in robot.description.rest.items():
-        if model.existJointName(name) and model.joints[model.getJointId(name)].nq == 1:
-            configuration[model.joints[model.getJointId(name)].idx_q] = angle
-    return configuration
 
 
 def _carrier(robot: Robot, joint: str) -> tuple[int | None, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,13 +12,19 @@ from numpy.typing import NDArray
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import EmbodimentError, OptionError
+from syda_gym.simulation.agreement import check_agreement
 from syda_gym.simulation.backend import NOMINAL, MotorConditions
+from syda_gym.simulation.plain_body import PlainBody, disabled_pairs, plain_body
+from syda_gym.simulation.quiet import quiet
 from syda_gym.simulation.rates import Rates
 
 __all__ = ["ROBOTS_PER_CLIENT", "World"]
 
 ROBOTS_PER_CLIENT = 16
 """More robots in one client slow its solver down (by a third at 32)."""
+
+_logger = logging.getLogger("syda_gym.simulation")
+_told: set[str] = set()  # robots whose links touch at rest
 
 _HOLD_FORCE = 1e5  # N m; legs and head are no subject of the simulation and stand like a rock
 _GRAVITY = (0.0, 0.0, -9.81)
@@ -56,12 +63,14 @@ class World:
         self._clients: list[int] = []
         self._puppets: list[_Puppet] = []
         per_client = 1 if self_collision else ROBOTS_PER_CLIENT
+        body = plain_body(robot, ("collision",) if self_collision else ())
         try:
             for first in range(0, count, per_client):
                 client = _connect(rates)
                 self._clients.append(client)
                 for _ in range(min(per_client, count - first)):
-                    self._puppets.append(_Puppet(robot, rates, client, self_collision))
+                    self._puppets.append(_Puppet(robot, rates, client, self_collision, body))
+            check_agreement(robot, self._puppets[0])
         except BaseException:
             self.close()
             raise
@@ -187,14 +196,17 @@ class World:
 class _Puppet:
     """One robot in one client."""
 
-    def __init__(self, robot: Robot, rates: Rates, client: int, self_collision: bool) -> None:
+    def __init__(self, robot: Robot, rates: Rates, client: int, self_collision: bool, plain: PlainBody) -> None:
         import pybullet
 
         self._bullet = pybullet
         self._client = client
         flags = pybullet.URDF_USE_SELF_COLLISION if self_collision else 0
+        if plain.xml:
+            flags |= pybullet.URDF_USE_INERTIA_FROM_FILE
         try:
-            body = pybullet.loadURDF(str(robot.urdf), useFixedBase=True, flags=flags, physicsClientId=client)
+            with plain.file(robot.urdf) as path, quiet(robot.name):
+                body = pybullet.loadURDF(path, useFixedBase=True, flags=flags, physicsClientId=client)
         except pybullet.error as error:
             raise EmbodimentError(f"PyBullet cannot load {robot.urdf}: {error}; check the file") from error
         self._body: int = body
@@ -211,10 +223,9 @@ class _Puppet:
         self._rest = [float(robot.description.rest.get(names[joint], 0.0)) for joint in self._movable]
         self._arm_places = [self._movable.index(joint) for joint in self._arms]
         self._still = [[0.0]] * len(self._movable)
-        points = [link for arm in _arms_in_order(robot) for link in (arm.elbow, arm.wrist)]
-        self._points = _ids(links, points, robot, "link")
+        self._points = _ids(links, plain.points, robot, "link")
         self.n_points = 3 * len(self._points)
-        self._hands = _ids(links, [arm.wrist for arm in _arms_in_order(robot)], robot, "link")
+        self._hands = _ids(links, plain.points[1::2], robot, "link")
         self._hand_masses = [pybullet.getDynamicsInfo(body, link, physicsClientId=client)[0] for link in self._hands]
         # A motor without a stated limit gets one that no arm will ever reach.
         self._effort = np.where(np.isfinite(robot.effort), robot.effort, _HOLD_FORCE)
@@ -222,8 +233,11 @@ class _Puppet:
         self._gain = rates.motor_gain
         self._held = [joint for joint in self._movable if joint not in self._arms]
         self._conditions = NOMINAL
-        self._stand_up(links[robot.description.torso])
-        self._filter(robot, links, self_collision)
+        if plain.torso is None:
+            pybullet.setGravity(*(plain.gravity or _GRAVITY), physicsClientId=client)
+        else:
+            self._stand_up(links[plain.torso])
+        self._filter(robot, links, self_collision, plain)
         self._hold()
         self._apply(NOMINAL)
         self._pristine: int | None = None
@@ -325,16 +339,35 @@ class _Puppet:
         down = bullet.rotateVector(self._turn, _GRAVITY)
         bullet.setGravity(*down, physicsClientId=client)
 
-    def _filter(self, robot: Robot, links: dict[str, int], self_collision: bool) -> None:
+    def _filter(self, robot: Robot, links: dict[str, int], self_collision: bool, plain: PlainBody) -> None:
         if self_collision:
-            for first, second in robot.description.disabled_collisions:
+            for first, second in disabled_pairs(robot, plain):
                 pair = _ids(links, (first, second), robot, "link")
-                self._bullet.setCollisionFilterPair(
-                    self._body, self._body, pair[0], pair[1], 0, physicsClientId=self._client
-                )
+                self._part(*pair)
+            if plain.xml:
+                self._part_what_touches_at_rest(robot, links)
             return
         for link in links.values():
             self._bullet.setCollisionFilterGroupMask(self._body, link, 0, 0, physicsClientId=self._client)
+
+    def _part(self, first: int, second: int) -> None:
+        self._bullet.setCollisionFilterPair(self._body, self._body, first, second, 0, physicsClientId=self._client)
+
+    def _part_what_touches_at_rest(self, robot: Robot, links: dict[str, int]) -> None:
+        """Coarse shapes may overlap at rest; such a contact would throw the arms about and says nothing."""
+        bullet, client = self._bullet, self._client
+        for joint, angle in zip(self._arms, robot.rest.tolist(), strict=True):
+            bullet.resetJointState(self._body, joint, angle, physicsClientId=client)
+        bullet.performCollisionDetection(physicsClientId=client)
+        points = bullet.getContactPoints(self._body, self._body, physicsClientId=client)
+        pairs = sorted({(point[3], point[4]) for point in points if point[8] <= 0.0})
+        names = {number: name for name, number in links.items()}
+        for pair in pairs:
+            self._part(*pair)
+        if pairs and robot.name not in _told:
+            _told.add(robot.name)
+            told = ", ".join(f"{names[a]} and {names[b]}" for a, b in pairs)
+            _logger.warning("%s: these links touch at rest, so their contact does not count: %s", robot.name, told)
 
     def _hold(self) -> None:
         angles = dict(zip(self._movable, self._rest, strict=True))
@@ -364,8 +397,3 @@ def _ids(known: dict[str, int], names: Sequence[str], robot: Robot, what: str) -
     if missing:
         raise EmbodimentError(f"{robot.urdf.name}: PyBullet knows no {what} {missing[0]!r}; it has {', '.join(known)}")
     return [known[name] for name in names]
-
-
-def _arms_in_order(robot: Robot) -> list[Any]:
-    by_side = {arm.side: arm for arm in robot.description.arms}
-    return [by_side[side] for side in robot.sides]

@@ -138,7 +138,7 @@ def test_bad_arms_are_named(tmp_path):
     wrong = [{**arms[0], "joints": ["LShoulderPich", *arms[0]["joints"][1:]]}, arms[1]]
     with pytest.raises(EmbodimentError, match="did you mean 'LShoulderPitch'"):
         Robot.read(_description(tmp_path, arms=wrong))
-    with pytest.raises(EmbodimentError, match="names of joints and links, got 3"):
+    with pytest.raises(EmbodimentError, match=r"line \d+: arms: .*'wrist' must be a link, .* got 3"):
         Robot.read(_description(tmp_path, arms=[{**arms[0], "wrist": 3}, arms[1]]))
     reordered = [{**arms[0], "joints": arms[0]["joints"][::-1]}, arms[1]]
     with pytest.raises(EmbodimentError, match="does not come after"):

@@ -33,7 +33,7 @@ def test_the_bound_covers_unseen_actions(method):
 
 
 def test_frames_unlike_the_training_are_flagged(adult_pepper):
-    mapping = fit(adult_pepper, epochs=20)
+    mapping = fit(adult_pepper)
     rng = np.random.default_rng(0)
     shuffled = rng.permuted(adult_pepper.source.reshape(-1, 6, 3), axis=1).reshape(-1, 18)
     assert mapping.unfamiliar(adult_pepper.source).mean() < 0.02
@@ -44,7 +44,7 @@ def test_frames_unlike_the_training_are_flagged(adult_pepper):
 
 
 def test_chains_combine_bounds_and_flags(adult_kid, kid_pepper):
-    hop, link = fit(adult_kid), fit(kid_pepper, epochs=20)
+    hop, link = fit(adult_kid), fit(kid_pepper)
     chain = hop >> link
     frames = adult_kid.source[:20]
     between = hop(frames)
@@ -60,9 +60,9 @@ def test_folds_share_the_fits_that_hold_out_the_same_two_actions(monkeypatch):
     folds = [pair.without_actions([name]) for name in pair.action_names]
     trained, train = [], general.train
     monkeypatch.setattr(general, "train", lambda jobs, *rest: trained.extend(jobs) or train(jobs, *rest))
-    together = fit_many(folds, epochs=3)
+    together = fit_many(folds, preset="synergies", epochs=3)
     assert len(trained) == 4 + 6  # each fold, and each pair of actions once rather than twice
     for fold, mapping in zip(folds, together, strict=True):
-        alone = fit(fold, epochs=3)
+        alone = fit(fold, preset="synergies", epochs=3)
         assert np.isclose(mapping.confidence.bound, alone.confidence.bound, rtol=1e-4)
         assert np.allclose(mapping(pair.source), alone(pair.source), atol=1e-4)

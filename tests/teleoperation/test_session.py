@@ -140,7 +140,7 @@ def test_a_run_starts_where_the_robot_is(mapping: LimbMapping, pepper: Robot) ->
 
 
 def test_mappings_are_chosen_by_name(tmp_path: Path) -> None:
-    chain, notices = choose_mapping("adult", "pepper", route=("adult", "kid", "pepper"))
+    chain, notices = choose_mapping("adult", "pepper", route=("adult", "kid", "pepper"), motions="embedded")
     assert chain.route == ("adult", "kid", "pepper")
     assert not notices
     with pytest.raises(OptionError, match="is no method"):

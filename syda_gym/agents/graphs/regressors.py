@@ -14,6 +14,7 @@ from syda_gym.mappings.models.heads import HeadedRegressor
 from syda_gym.mappings.models.hop import HopRegressor, MeanRegressor, TwoWay
 from syda_gym.mappings.models.linear import KernelRidge, Nearest, Ridge
 from syda_gym.mappings.models.networks import Stack
+from syda_gym.mappings.models.prior import PriorRegressor
 from syda_gym.mappings.models.regressors import DirectRegressor, DualRegressor, Regressor
 from syda_gym.mappings.models.rotation import GeometricRegressor
 from syda_gym.mappings.models.scaling import Scaler
@@ -168,5 +169,6 @@ REGRESSORS: dict[type[Regressor], Callable[..., nn.Module]] = {
     MeanRegressor: _Mean,
     TwoWay: _two_way,
     GeometricRegressor: _Affine,
+    PriorRegressor: _Affine,
 }
 """Kind of model to what makes its module."""

@@ -3,27 +3,44 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from syda_gym.embodiments.discovery.limbs import Limb, find_limbs, is_movable, side_by_name
+from syda_gym.embodiments.description import ArmDescription, RobotDescription
+from syda_gym.embodiments.discovery.landmarks import find_landmarks
+from syda_gym.embodiments.discovery.limbs import (
+    Limb,
+    find_limbs,
+    is_movable,
+    kind_by_name,
+    movable_above,
+    side_by_name,
+)
+from syda_gym.embodiments.discovery.orientation import body_axes
 from syda_gym.embodiments.embodiment import SIDES, FloatArray, Side
-from syda_gym.embodiments.kinematics.arm_chain import ArmChain
-from syda_gym.embodiments.kinematics.urdf import UrdfTree, arm_chain, read_urdf, zero_placements
-from syda_gym.embodiments.robot import ArmDescription, Robot, RobotDescription
+from syda_gym.embodiments.kinematics.urdf import UrdfTree, read_urdf, zero_placements
+from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import EmbodimentError, nearest_name
 
-__all__ = ["discover", "discover_robot"]
+__all__ = ["Found", "discover", "discover_robot", "search"]
 
-_TIP = re.compile(r"tool|tcp|tip|ee($|_)|eef|endpoint|end_effector|gripper|palm|hand|grasp|flange", re.I)
-_SENSOR = re.compile(
-    r"cam|imu|force|sensor|optical|marker|light|accelero|range|itb|virtual|collision|shape|(^|_)ft($|_)", re.I
-)
-_FINGER = re.compile(r"finger|thumb", re.I)
-_SWINGING = 0.5  # a joint swings a point if its lever is at least this share of the longest one
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found.
+
+    Attributes:
+        description: for ``Robot``.
+        notes: what a person should know about the file and the search.
+        left_out: joints of the arms' limbs that are not used, such as prismatic ones, gears and followers.
+    """
+
+    description: RobotDescription
+    notes: tuple[str, ...]
+    left_out: tuple[str, ...]
 
 
 def discover_robot(
@@ -50,9 +67,9 @@ def discover(
 
     An arm is an unbranched run of at least two revolute joints that ends in a hand or at a tip. Names tell arms from
     legs and heads (shoulder, elbow, wrist against hip, knee, ankle); runs whose names say nothing count as arms if
-    there are at most two. Names tell left from right, positions where names do not. The elbow is the joint that
-    changes the distance from shoulder to tip most; shoulder and wrist are the nearest joints on its two sides that
-    bend the arm rather than turn it about itself. Check what was found: the description is meant to be edited.
+    there are at most two. Names tell left from right, positions where names do not. Shoulder, elbow and wrist are where
+    the joint axes say (``discovery.landmarks``), body axes follow from the shoulders (``discovery.orientation``).
+    Check what was found: the description is meant to be edited.
 
     Args:
         urdf: path of the URDF; meshes are not needed.
@@ -67,6 +84,22 @@ def discover(
     Raises:
         EmbodimentError: not a URDF, no arm, more arms than can be told apart, unknown links.
     """
+    return search(urdf, name=name, left=left, right=right, torso=torso).description
+
+
+def search(
+    urdf: str | os.PathLike[str],
+    *,
+    name: str | None = None,
+    left: str | None = None,
+    right: str | None = None,
+    torso: str | None = None,
+) -> Found:
+    """``discover``, with what a person should know about the file and the search.
+
+    Raises:
+        EmbodimentError: as ``discover``.
+    """
     path = Path(urdf)
     tree = read_urdf(path)
     placements = zero_placements(tree)
@@ -74,22 +107,129 @@ def discover(
         chosen = _arms_by_search(tree, placements)
     else:
         chosen = _arms_by_name(tree, {"left": left, "right": right})
+    _refuse_cut_arms(tree, chosen)
     if torso is None:
         torso = _common_link(tree, [joints[0] for joints in chosen.values()])
     elif torso not in tree.links():
         raise EmbodimentError(f"{path.name} has no link {torso!r}; {nearest_name(torso, tree.links())}")
+    tree.limits([joint for joints in chosen.values() for joint in joints])  # every faulty joint is named at once
     tips = {"left": left, "right": right}
-    arms = tuple(_describe(tree, placements, side, joints, tips[side]) for side, joints in chosen.items())
+    arms, failures = [], []
+    for side, joints in chosen.items():
+        try:
+            arms.append(find_landmarks(tree, placements, side, joints, tips[side]))
+        except EmbodimentError as error:
+            failures.append(f"{error}{_prismatic_reason(tree, joints, chosen)}")
+    if failures:
+        raise EmbodimentError(" | ".join(failures))
+    axes = _axes(tree, placements, arms)
     origins = np.array([placement[:3, 3] for placement in placements.values()])
-    up = _body_axes(tree, placements, chosen)[2]
-    return RobotDescription(
+    description = RobotDescription(
         name=name or path.stem,
         urdf=path.resolve(),
         torso=torso,
-        height=max(float(np.ptp(origins @ up)), 0.1),
-        arms=arms,
-        axes=_torso_axes(tree, placements, chosen, torso),
+        height=max(float(np.ptp(origins @ axes[2])), 0.1),
+        arms=tuple(arms),
+        axes=_torso_axes(axes @ placements[torso][:3, :3]),
     )
+    unused = _left_out(tree, arms)
+    return Found(description, (*tree.notes, *_notes(tree, arms, chosen)), unused)
+
+
+def _notes(tree: UrdfTree, arms: Sequence[ArmDescription], chosen: dict[Side, tuple[str, ...]]) -> list[str]:
+    notes = []
+    sliding = [name for joints in chosen.values() for name in _sliding_above(tree, joints)]
+    if sliding:
+        names = ", ".join(dict.fromkeys(sliding))
+        notes.append(f"prismatic joints are not driven and stand still: {names}")
+    followers = [
+        name
+        for arm in arms
+        for name in tree.path_to(tree.joints[arm.joints[0]].parent, arm.tip) or ()
+        if tree.joints[name].mimic is not None and tree.joints[name].type != "fixed"
+    ]
+    if followers:
+        notes.append(f"joints that follow others (<mimic>) stand still: {', '.join(dict.fromkeys(followers))}")
+    used = [name for arm in arms for name in arm.joints]
+    unknown = [name for name in tree.placeholders if name in used]
+    if unknown:
+        notes.append(
+            f"the efforts or speeds stated for {', '.join(unknown)} are placeholders that no motor has (such as 0, "
+            "-1 or 1e9); taken as unknown"
+        )
+    return notes
+
+
+def _left_out(tree: UrdfTree, arms: Sequence[ArmDescription]) -> tuple[str, ...]:
+    """Movable joints at or below an arm's first joint, or right above it, that are not used."""
+    used = {name for arm in arms for name in arm.joints}
+    found = [
+        name
+        for name, joint in tree.joints.items()
+        if name not in used
+        and joint.type != "fixed"
+        and any(tree.path_to(tree.joints[arm.joints[0]].child, joint.child) is not None for arm in arms)
+    ]
+    above = [name for arm in arms for name in _sliding_above(tree, arm.joints)]
+    return tuple(dict.fromkeys([*above, *found]))
+
+
+def _sliding_above(tree: UrdfTree, joints: Sequence[str]) -> list[str]:
+    """Prismatic joints between the root and an arm."""
+    return [name for name in movable_above(tree, joints[0]) if tree.joints[name].type == "prismatic"]
+
+
+def _sliding_below(tree: UrdfTree, joints: Sequence[str]) -> tuple[str, str] | None:
+    """A prismatic joint right behind an arm from which at least two turning joints go on, and the first of these."""
+    last = tree.joints[joints[-1]].child
+    for name in tree.joints:
+        if not is_movable(tree, name) or tree.joints[name].type == "prismatic":
+            continue
+        if tree.path_to(last, tree.joints[name].child) is None:
+            continue
+        above = movable_above(tree, name)
+        between = above[: above.index(joints[-1])] if joints[-1] in above else []
+        sliding = [joint for joint in between if tree.joints[joint].type == "prismatic"]
+        turning = [joint for joint in between if tree.joints[joint].type != "prismatic"]
+        if sliding and turning and between[-1] in sliding:  # a gripper's jaws turn no further joints
+            return sliding[-1], turning[-1]
+    return None
+
+
+def _prismatic_reason(tree: UrdfTree, joints: Sequence[str], chosen: dict[Side, tuple[str, ...]]) -> str:
+    """Why an arm may be but a wrist: it hangs on prismatic joints, which are not driven."""
+    sliding = _sliding_above(tree, joints)[::-1]
+    if not sliding:
+        return ""
+    names = ", ".join(sliding)
+    return f". It hangs on the prismatic joints {names}, which slide and are not driven: arms are made of turning ones"
+
+
+def _refuse_cut_arms(tree: UrdfTree, chosen: dict[Side, tuple[str, ...]]) -> None:
+    """An arm with a prismatic joint between turning ones would be found from there on only."""
+    for side, joints in chosen.items():
+        above = movable_above(tree, joints[0])
+        others = {name for other, theirs in chosen.items() if other != side for name in movable_above(tree, theirs[0])}
+        own = [name for name in above if name not in others] if len(chosen) > 1 else above
+        below = _sliding_below(tree, joints)
+        if below:
+            raise EmbodimentError(
+                f"{tree.path.name}: the {side} arm has the prismatic joint {below[0]!r} between {joints[-1]!r} and "
+                f"{below[1]!r}; arms are made of turning joints. Make it fixed, or name arms without it"
+            )
+        slides = [name for name in own if tree.joints[name].type == "prismatic"]
+        turns = [
+            name
+            for name in own
+            if tree.joints[name].type != "prismatic" and slides and above.index(name) > above.index(slides[0])
+        ]
+        named = [name for name in turns if kind_by_name([name, tree.joints[name].child]) == "arm"]
+        if slides and (named or (len(chosen) > 1 and turns)):
+            raise EmbodimentError(
+                f"{tree.path.name}: the {side} arm has the prismatic joint {slides[0]!r} between "
+                f"{(named or turns)[0]!r} and {joints[0]!r}; arms are made of turning joints. "
+                "Make it fixed, or name arms without it"
+            )
 
 
 def _arms_by_search(tree: UrdfTree, placements: dict[str, FloatArray]) -> dict[Side, tuple[str, ...]]:
@@ -169,112 +309,19 @@ def _common_link(tree: UrdfTree, firsts: Sequence[str]) -> str:
     return link
 
 
-def _body_axes(tree: UrdfTree, placements: dict[str, FloatArray], arms: dict[Side, tuple[str, ...]]) -> FloatArray:
-    """Rows: forward, left and up in the root's frame. ROS has them along x, y, z, but not every model does."""
-    axes = np.eye(3)
-    if len(arms) < 2:
-        return axes
-    # The middle of each arm, because the first joints of both may share one place on the breastbone.
-    middle = {
-        side: np.mean([placements[tree.joints[name].child][:3, 3] for name in joints], axis=0)
-        for side, joints in arms.items()
-    }
-    lateral = middle["left"] - middle["right"]
-    if np.linalg.norm(lateral) < 1e-3:
-        return axes
-    left = np.eye(3)[np.argmax(np.abs(lateral))] * np.sign(lateral[np.argmax(np.abs(lateral))])
-    up = np.array([0.0, 0.0, 1.0])
-    if abs(left @ up) > 0.5:  # a model whose z points sideways: up is where the arms are, seen from the rest
-        origins = np.array([placement[:3, 3] for placement in placements.values()])
-        rise = 0.5 * (middle["left"] + middle["right"]) - origins.mean(axis=0)
-        rise -= left * (left @ rise)
-        up = np.eye(3)[np.argmax(np.abs(rise))] * np.sign(rise[np.argmax(np.abs(rise))])
-    return np.array([np.cross(left, up), left, up])
+def _axes(tree: UrdfTree, placements: dict[str, FloatArray], arms: Sequence[ArmDescription]) -> FloatArray:
+    """Forward, left and up in the root's frame."""
+    shoulders = []
+    for arm in arms:
+        frame = placements[arm.shoulder]
+        shoulders.append(frame[:3, 3] + frame[:3, :3] @ np.array(arm.point_offsets[0]))
+    middles = [np.mean([placements[tree.joints[name].child][:3, 3] for name in arm.joints], axis=0) for arm in arms]
+    return body_axes(tree, placements, shoulders, middles, find_limbs(tree, placements))
 
 
-def _torso_axes(
-    tree: UrdfTree, placements: dict[str, FloatArray], arms: dict[Side, tuple[str, ...]], torso: str
-) -> tuple[tuple[float, float, float], ...] | None:
+def _torso_axes(rotation: FloatArray) -> tuple[tuple[float, float, float], ...] | None:
     """Rotation from the torso link's frame to body axes; ``None`` if they agree."""
-    rotation = _body_axes(tree, placements, arms) @ placements[torso][:3, :3]
     if np.allclose(rotation, np.eye(3), atol=1e-3):
         return None
     rounded = np.where(np.abs(rotation - np.round(rotation)) < 1e-6, np.round(rotation), rotation)
     return tuple((float(row[0]), float(row[1]), float(row[2])) for row in rounded + 0.0)
-
-
-def _describe(
-    tree: UrdfTree, placements: dict[str, FloatArray], side: Side, joints: tuple[str, ...], tip: str | None
-) -> ArmDescription:
-    links = [tree.joints[name].child for name in joints]
-    tip = tip or _tip(tree, placements, links[-1])
-    chain = arm_chain(tree, tree.joints[joints[0]].parent, side, joints, (links[0], links[0], tip, tip))
-    origins = np.array([placements[link][:3, 3] for link in links])
-    axes = np.array([placements[link][:3, :3] @ axis for link, axis in zip(links, chain.axes, strict=True)])
-    end = placements[tip][:3, 3]
-    elbow = _elbow(chain)
-    return ArmDescription(
-        side=side,
-        joints=joints,
-        shoulder=links[_shoulder(origins, axes, elbow)],
-        elbow=links[elbow],
-        wrist=_wrist(links, origins, axes, elbow, end) or tip,
-        tip=tip,
-    )
-
-
-def _tip(tree: UrdfTree, placements: dict[str, FloatArray], last: str) -> str:
-    """The link that ends the arm: a tool, palm or hand fixed behind the last joint, else the last link."""
-    origin = placements[last][:3, 3]
-    fixed = [link for link in sorted(tree.links()) if _fixed_to(tree, last, link) and not _SENSOR.search(link)]
-    named = [link for link in fixed if _TIP.search(link) and not _FINGER.search(link)]
-    distances = {link: float(np.linalg.norm(placements[link][:3, 3] - origin)) for link in named or fixed}
-    best = max(distances, key=lambda link: distances[link], default=last)
-    return best if distances.get(best, 0.0) > 1e-6 else last
-
-
-def _fixed_to(tree: UrdfTree, last: str, link: str) -> bool:
-    path = tree.path_to(last, link)
-    return bool(path) and all(tree.joints[name].type == "fixed" for name in path or ())
-
-
-def _elbow(chain: ArmChain) -> int:
-    """The joint that changes the distance from the first joint to the tip most, on average over the joint limits."""
-    rng = np.random.default_rng(0)
-    q = rng.uniform(chain.lower, chain.upper, (512, chain.n_joints))
-    points, jacobians = chain.jacobians(q)
-    arm = points[:, 3] - chain.offsets[0]
-    length = np.linalg.norm(arm, axis=1, keepdims=True)
-    direction = arm / np.maximum(length, 1e-9)
-    effect = np.abs(np.einsum("ni,nij->nj", direction, jacobians[:, 3])).mean(axis=0)
-    if not effect.max() > 1e-9:
-        raise EmbodimentError(
-            f"no joint of the {chain.side} arm ({', '.join(chain.joints)}) bends it: its tip keeps its distance from "
-            "the shoulder. Name a link beyond the wrist: left=LINK or right=LINK"
-        )
-    return int(np.argmax(effect))
-
-
-def _shoulder(origins: FloatArray, axes: FloatArray, elbow: int) -> int:
-    """Last joint before the elbow that swings it; the ones that turn the upper arm about itself have no lever."""
-    if elbow == 0:
-        return 0
-    levers = _levers(origins[:elbow], axes[:elbow], origins[elbow])
-    return int(np.flatnonzero(levers >= _SWINGING * levers.max())[-1])
-
-
-def _wrist(links: list[str], origins: FloatArray, axes: FloatArray, elbow: int, end: FloatArray) -> str | None:
-    """First joint after the elbow that swings the hand, or the last one well down the forearm; ``None`` for the tip."""
-    reach = float(np.linalg.norm(end - origins[elbow]))
-    after = [i for i in range(elbow + 1, len(links)) if np.linalg.norm(origins[i] - origins[elbow]) > 0.25 * reach]
-    if not after:
-        return None
-    levers = _levers(origins[after], axes[after], origins[elbow])
-    swinging = np.flatnonzero(levers > max(_SWINGING * float(levers.max()), 0.1 * reach))
-    return links[after[int(swinging[0]) if len(swinging) else -1]]
-
-
-def _levers(origins: FloatArray, axes: FloatArray, point: FloatArray) -> FloatArray:
-    """Distance of a point from each joint axis [m]."""
-    levers: FloatArray = np.linalg.norm(np.cross(axes, point - origins), axis=1)
-    return levers

@@ -11,13 +11,14 @@ import numpy as np
 from syda_gym.embodiments.embodiment import FloatArray, Side
 from syda_gym.embodiments.kinematics.urdf import UrdfTree
 
-__all__ = ["Limb", "find_limbs", "is_movable", "movable_above", "side_by_name"]
+__all__ = ["Limb", "find_limbs", "is_movable", "kind_by_name", "movable_above", "side_by_name"]
 
 _ARM_WORDS = re.compile(r"arm|shoulder|elbow|wrist|hand|gripper|clavicle|scapula|humerus|tool")
 _LEG_WORDS = re.compile(r"leg|hip|knee|ankle|foot|feet|thigh|calf|shank|toe|haa|hfe|kfe|wheel|hock")
 _OTHER_WORDS = re.compile(r"head|neck|eye|cam|laser|velodyne|torso|waist|spine|lumbar|thora|cervical|rotor|prop"
                           r"|finger|thumb|index|pinky|trunk|chest|pan_tilt|antenna")  # fmt: skip
 _HAND_JOINT = re.compile(r"hand|finger|gripper|thumb|index|middle|ring|pinky|little|jaw|claw|grasp|knuckle", re.I)
+_GEAR = re.compile(r"gear|pulley|spur|rotor|motor_shaft", re.I)
 _UPRIGHT = re.compile(r"yaw|roll|pitch", re.I)
 _SIDES = {
     side: re.compile(
@@ -105,7 +106,40 @@ def _children(tree: UrdfTree) -> dict[str, list[str]]:
         above = movable_above(tree, name)
         if above:
             below[above[0]].append(name)
-    return below
+    return _without_leaves(tree, below)
+
+
+def _without_leaves(tree: UrdfTree, below: dict[str, list[str]]) -> dict[str, list[str]]:
+    """Leaves beside the road taken out: a motor's gear, a flap or a cover drives nothing and cuts no arm.
+
+    A leaf is a joint with no joint below it. It counts as one of those if its name says so, or if another joint beside
+    it leads on through at least two joints that are no hand's.
+    """
+    leaves: set[str] = set()
+    for children in below.values():
+        onward = [child for child in children if _depth(below, child) >= 2 and not _HAND_JOINT.search(child)]
+        ends = [child for child in children if not below[child] and not _is_side(tree, child)]
+        gears = [
+            child for child in children if not below[child] and _GEAR.search(f"{child} {tree.joints[child].child}")
+        ]
+        if len(onward) == 1:
+            leaves.update(ends)
+        if len(gears) < len(children):
+            leaves.update(gears)
+    return {name: [c for c in children if c not in leaves] for name, children in below.items() if name not in leaves}
+
+
+def _depth(below: dict[str, list[str]], joint: str) -> int:
+    """Joints on the longest way from a joint outward, itself included."""
+    count, level = 0, [joint]
+    while level:
+        count, level = count + 1, [child for name in level for child in below[name]]
+    return count
+
+
+def _is_side(tree: UrdfTree, joint: str) -> bool:
+    """Whether a name says head or leg: on a waist these are no leaves of an arm."""
+    return kind_by_name([joint, tree.joints[joint].child]) in ("leg", "other")
 
 
 def _runs(tree: UrdfTree, below: dict[str, list[str]]) -> list[tuple[str, ...]]:
@@ -153,7 +187,12 @@ def _without_hand(run: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _kind(tree: UrdfTree, joints: tuple[str, ...]) -> str:
-    words = [part.lower() for name in joints for part in (name, tree.joints[name].child)]
+    return kind_by_name([part for name in joints for part in (name, tree.joints[name].child)])
+
+
+def kind_by_name(names: Iterable[str]) -> str:
+    """``arm``, ``leg``, ``other`` or ``unknown``, by the words in the names of joints and links."""
+    words = [name.lower() for name in names]
     counts = {
         kind: sum(bool(pattern.search(word)) for word in words)
         for kind, pattern in (("arm", _ARM_WORDS), ("leg", _LEG_WORDS), ("other", _OTHER_WORDS))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +14,19 @@ import numpy as np
 from syda_gym.embodiments.embodiment import FloatArray, Side
 from syda_gym.embodiments.kinematics.arm_chain import ArmChain
 from syda_gym.embodiments.kinematics.urdf_budget import check_urdf_tree
+from syda_gym.embodiments.reading.checking import check
+from syda_gym.embodiments.reading.cleaning import clean_urdf, model_joint_names
+from syda_gym.embodiments.reading.parts import Joint, Shape
+from syda_gym.embodiments.reading.shapes import read_shapes
+from syda_gym.embodiments.reading.source import read_source
 from syda_gym.errors import EmbodimentError, nearest_name
 
-__all__ = ["JointLimits", "UrdfTree", "arm_chain", "read_urdf", "zero_placements"]
-
-_MAX_URDF_BYTES = 32 * 2**20
+__all__ = ["JointLimits", "UrdfTree", "arm_chain", "configuration", "placements_at", "read_urdf", "zero_placements"]
 
 
 @dataclass(frozen=True)
 class JointLimits:
-    """Limits of some joints: position [rad], speed [rad/s], effort [N m], each ``(n,)``."""
+    """Limits of some joints: position [rad], speed [rad/s], effort [N m], each ``(n,)``; infinite where unknown."""
 
     lower: FloatArray
     upper: FloatArray
@@ -31,14 +36,31 @@ class JointLimits:
 
 @dataclass(frozen=True, eq=False)
 class UrdfTree:
-    """A parsed URDF: yourdfpy's joints by name, and pinocchio's model of the same file."""
+    """A robot's file as a tree.
+
+    Attributes:
+        path: the file.
+        joints: by name.
+        parent_joint: link to the joint that it hangs on.
+        model: pinocchio's model.
+        model_joints: joint name to the name in ``model``, another one where a link has the joint's name.
+        shapes: visual and collision shapes by link.
+        xml: the robot as XML that strict parsers take, with inertias and collision shapes.
+        notes: small faults of the file that were mended.
+        placeholders: joints whose stated effort or speed no motor has; taken as unknown.
+    """
 
     path: Path
-    joints: dict[str, Any]
+    joints: dict[str, Joint]
     parent_joint: dict[str, str]
     model: Any
+    model_joints: dict[str, str]
+    shapes: dict[str, tuple[Shape, ...]]
+    xml: str
+    notes: tuple[str, ...] = ()
+    placeholders: tuple[str, ...] = ()
 
-    def joint(self, name: str) -> Any:
+    def joint(self, name: str) -> Joint:
         """The joint called ``name``; an error with the nearest name if there is none."""
         if name not in self.joints:
             raise EmbodimentError(f"{self.path.name} has no joint {name!r}; {nearest_name(name, self.joints)}")
@@ -48,30 +70,35 @@ class UrdfTree:
         """Limits of the named joints; continuous joints get one turn each way.
 
         Raises:
-            EmbodimentError: a joint without limits, or with lower not below upper.
+            EmbodimentError: joints without limits, or with lower not below upper; all of them are named.
         """
+        faults = [fault for name in names if (fault := self._limit_fault(name))]
+        if faults:
+            raise EmbodimentError(f"{self.path.name}: " + "; ".join(faults))
         rows = [self._limit(name) for name in names]
         lower, upper, speed, effort = (np.array(column, dtype=np.float64) for column in zip(*rows, strict=True))
         return JointLimits(lower, upper, speed, effort)
 
-    def _limit(self, name: str) -> tuple[float, float, float, float]:
+    def _limit_fault(self, name: str) -> str:
         joint = self.joint(name)
-        limit = joint.limit
+        limit, line = joint.limit, f" (line {joint.line})" if joint.line else ""
         if joint.type == "continuous":
-            speed = getattr(limit, "velocity", None) or np.inf
-            return -np.pi, np.pi, float(speed), float(getattr(limit, "effort", None) or np.inf)
+            return ""
         if limit is None or limit.lower is None or limit.upper is None:
-            raise EmbodimentError(f"{self.path.name}: joint {name!r} has no <limit lower upper>; add it to the URDF")
+            return f"joint {name!r}{line} has no <limit lower upper>; add it to the URDF"
         if not limit.lower < limit.upper:
-            raise EmbodimentError(
-                f"{self.path.name}: joint {name!r} has lower limit {limit.lower} not below upper {limit.upper}"
-            )
-        return (
-            float(limit.lower),
-            float(limit.upper),
-            float(limit.velocity or np.inf),
-            float(limit.effort or np.inf),
-        )
+            hint = "swap them, and mind the sign of the axis" if limit.lower > limit.upper else "it cannot move"
+            return f"joint {name!r}{line} has lower limit {limit.lower} not below upper {limit.upper}; {hint}"
+        return ""
+
+    def _limit(self, name: str) -> tuple[float, float, float, float]:
+        joint = self.joints[name]
+        limit = joint.limit
+        speed = np.inf if limit is None or limit.velocity is None else limit.velocity
+        effort = np.inf if limit is None or limit.effort is None else limit.effort
+        if joint.type == "continuous" or limit is None or limit.lower is None or limit.upper is None:
+            return -np.pi, np.pi, speed, effort
+        return limit.lower, limit.upper, speed, effort
 
     def path_to(self, ancestor: str, link: str) -> list[str] | None:
         """Joint names from ``ancestor`` down to ``link``, or ``None`` if ``ancestor`` is not above it."""
@@ -90,35 +117,55 @@ class UrdfTree:
 
 
 def read_urdf(path: str | Path) -> UrdfTree:
-    """Parses a URDF without its meshes.
+    """Reads a robot's file without its meshes: a URDF, or a xacro or MJCF where the extra for it is installed.
 
     Raises:
-        EmbodimentError: the file is missing, too large, or not a URDF.
+        EmbodimentError: the file is missing, too large, or no robot; every fault in it is named with its line.
+        MissingExtraError: a xacro or MJCF without what reads it.
     """
-    import pinocchio
-    import yourdfpy
-
     file = Path(path)
     if not file.is_file():
         raise EmbodimentError(f"no URDF {file}; check the path")
-    if file.stat().st_size > _MAX_URDF_BYTES:
-        raise EmbodimentError(f"{file} is larger than {_MAX_URDF_BYTES >> 20} MB; that is no plain URDF")
+    stat = file.stat()
+    return _read(os.path.abspath(file), stat.st_mtime_ns, stat.st_size)
+
+
+@lru_cache(maxsize=8)
+def _read(path: str, _changed: int, _size: int) -> UrdfTree:
+    """Kept, because one command reads a robot several times; a changed file is read anew."""
+    import pinocchio
+
+    file = Path(path)
     check_urdf_tree(file)
+    root = read_source(file)
+    checked = check(root, file)
+    shapes = read_shapes(checked.links, file, root)
+    elements = {element.get("name"): element for element in root.findall("joint")}
+    xml = clean_urdf(checked.links, checked.joints, elements, shapes)
     try:
-        urdf = yourdfpy.URDF.load(
-            str(file), build_scene_graph=False, load_meshes=False, build_collision_scene_graph=False
-        )
-        model = pinocchio.buildModelFromUrdf(str(file))
-    except Exception as error:  # both parsers raise many kinds, from lxml errors to C++ exceptions
+        model = pinocchio.buildModelFromXML(xml)
+    except Exception as error:  # C++ exceptions of many kinds
         raise EmbodimentError(f"{file} is not a URDF that can be read: {error}; expected a <robot> tree") from error
-    joints = dict(urdf.joint_map)
-    if not joints:
-        raise EmbodimentError(f"{file} has no joints; expected the URDF of a robot with at least one arm")
-    return UrdfTree(file, joints, {joint.child: name for name, joint in joints.items()}, model)
+    return UrdfTree(
+        path=file,
+        joints=checked.joints,
+        parent_joint={joint.child: name for name, joint in checked.joints.items()},
+        model=model,
+        model_joints=model_joint_names(checked.joints, checked.links),
+        shapes=shapes,
+        xml=xml,
+        notes=checked.notes,
+        placeholders=checked.placeholders,
+    )
 
 
 def arm_chain(
-    tree: UrdfTree, torso: str, side: Side, joints: Sequence[str], points: tuple[str, str, str, str]
+    tree: UrdfTree,
+    torso: str,
+    side: Side,
+    joints: Sequence[str],
+    points: Sequence[str],
+    places: Sequence[Sequence[float]] | None = None,
 ) -> ArmChain:
     """Builds the kinematics of one arm, all other joints locked at zero.
 
@@ -127,7 +174,8 @@ def arm_chain(
         torso: link in whose frame positions are expressed.
         side: which arm.
         joints: revolute joints of the arm from the torso outward.
-        points: links whose origins are shoulder, elbow, wrist and tip.
+        points: links that carry shoulder, elbow, wrist and tip.
+        places: where these points lie in the frames of their links [m]; by default at the origins.
 
     Raises:
         EmbodimentError: no joint, unknown names, joints out of order or not revolute.
@@ -148,11 +196,12 @@ def arm_chain(
             raise EmbodimentError(f"{tree.path.name}: joint {after!r} does not come after {before!r} in the arm")
     steps = [np.linalg.inv(a) @ b for a, b in zip([np.eye(4), *frames[:-1]], frames, strict=True)]
     carriers = tuple(_carrier(tree, joints, link) for link in points)
-    offsets = [
-        (inverse_torso @ placements[link] if carrier < 0 else np.linalg.inv(frames[carrier]) @ inverse_torso
-         @ placements[link])[:3, 3]
-        for link, carrier in zip(points, carriers, strict=True)
-    ]  # fmt: skip
+    offsets = []
+    for link, carrier, place in zip(points, carriers, places or [(0.0, 0.0, 0.0)] * len(points), strict=True):
+        seen = inverse_torso @ placements[link]
+        if carrier >= 0:
+            seen = np.linalg.inv(frames[carrier]) @ inverse_torso @ placements[link]
+        offsets.append(seen[:3, 3] + seen[:3, :3] @ np.asarray(place, dtype=np.float64) if any(place) else seen[:3, 3])
     limits = tree.limits(joints)
     axes = np.array([np.asarray(tree.joints[name].axis, dtype=np.float64) for name in joints])
     return ArmChain(
@@ -163,7 +212,7 @@ def arm_chain(
         axes=axes / np.linalg.norm(axes, axis=1, keepdims=True),
         lower=limits.lower,
         upper=limits.upper,
-        point_joints=(carriers[0], carriers[1], carriers[2], carriers[3]),
+        point_joints=carriers,
         point_offsets=np.array(offsets),
     )
 
@@ -176,12 +225,41 @@ def _carrier(tree: UrdfTree, joints: Sequence[str], link: str) -> int:
 
 def zero_placements(tree: UrdfTree) -> dict[str, FloatArray]:
     """Homogeneous transforms of every link at the zero configuration, by pinocchio."""
+    return placements_at(tree, {})
+
+
+def placements_at(tree: UrdfTree, angles: Mapping[str, float]) -> dict[str, FloatArray]:
+    """Homogeneous transforms ``(4, 4)`` of every link where the named joints have the given angles, others 0."""
     import pinocchio
 
     data = tree.model.createData()
-    pinocchio.framesForwardKinematics(tree.model, data, pinocchio.neutral(tree.model))
+    pinocchio.framesForwardKinematics(tree.model, data, configuration(tree, angles))
     return {
         frame.name: np.array(data.oMf[index].homogeneous)
         for index, frame in enumerate(tree.model.frames)
         if frame.type == pinocchio.FrameType.BODY
     }
+
+
+def configuration(tree: UrdfTree, angles: Mapping[str, float]) -> FloatArray:
+    """Pinocchio's configuration with the named joints at the given angles [rad], all others at zero.
+
+    Joints that follow another one (``<mimic>``) follow it.
+    """
+    import pinocchio
+
+    wanted = dict(angles)
+    for name, joint in tree.joints.items():
+        if joint.mimic is not None and joint.mimic.joint in tree.joints and name not in angles:
+            wanted[name] = joint.mimic.multiplier * angles.get(joint.mimic.joint, 0.0) + joint.mimic.offset
+    q: FloatArray = pinocchio.neutral(tree.model)
+    for name, angle in wanted.items():
+        other = tree.model_joints.get(name, name)
+        if not tree.model.existJointName(other):
+            continue
+        joint = tree.model.joints[tree.model.getJointId(other)]
+        if joint.nq == 2:  # a continuous joint is a cosine and a sine in pinocchio
+            q[joint.idx_q : joint.idx_q + 2] = np.cos(angle), np.sin(angle)
+        elif joint.nq == 1:
+            q[joint.idx_q] = angle
+    return q

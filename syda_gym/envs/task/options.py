@@ -27,8 +27,9 @@ __all__ = ["ACTION_MODES", "REFERENCES", "STARTS", "TeleopOptions"]
 ACTION_MODES = ("residual", "position")
 """Actions are corrections of the base command, or joint angles."""
 
-REFERENCES = ("paired", "mapped")
-"""Track the robot's own paired motion, or what the mapping makes of the undisturbed operator."""
+REFERENCES = ("auto", "paired", "mapped")
+"""Track the robot's own paired motion, or what the mapping makes of the undisturbed operator; ``auto``: the first where
+operator and robot were recorded together."""
 
 STARTS = ("first", "uniform", "failures")
 """Start frame: the clip's first, any, or more often where the landmark error is large."""
@@ -54,7 +55,7 @@ class TeleopOptions:
     held_out: Sequence[str] = ()
     via: Sequence[str] | None = None
     fit_seed: int = 0
-    reference: str = "paired"
+    reference: str = "auto"
     action_mode: str = "residual"
     residual_scale: float = 0.25
     preview: int = 0

@@ -7,6 +7,7 @@ passes beside the head. Base commands and mapped references therefore go through
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.embodiments import catalog
+from syda_gym.embodiments.catalog import is_robot_file
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.envs.task.disturbances import freeze_elbow_yaw
@@ -59,28 +61,33 @@ class Repertoire:
         motions = load_motions(options.motions, options.fps)
         self.operator = _body(motions, options.operator, "operator")
         robot = _body(motions, options.robot, "robot", needed=options.reference == "paired")
+        paired = options.reference == "paired" or (
+            options.reference == "auto" and _together(motions, self.operator.name, robot.name)
+        )
         if not isinstance(robot, Robot):
             raise EmbodimentError(f"robot={robot.name!r} is a {robot.kind}; choose a robot such as 'pepper'")
         self.robot = robot
         self._control_hz = float(options.control_hz)
-        source, target = _clips(motions, options, self.operator.name, robot.name)
+        source, target = _clips(motions, options, self.operator.name, robot.name, paired)
         self.pilot = Pilot(
             motions,
-            self.operator.name,
-            robot.name,
+            self.operator,
+            robot,
             mapping=options.mapping,
             preset=options.preset,
             held_out=options.held_out,
             via=options.via,
             seed=options.fit_seed,
         )
+        for notice in self.pilot.notices:
+            warnings.warn(notice, UserWarning, stacklevel=2)
         self.routes: list[PlannedRoute] = list(self.pilot.plan(options.route))
         self.clips = _entries(source)
         self.operator_rows = _padded([clip.frames for clip in source])
         self._mapped: dict[int, FloatArray] = {}
         self._targets: dict[float, FloatArray] = {}
         self.mapped_rows(0)  # now, so that a mapping that cannot be fitted says so at once
-        self._paired_rows = _padded([clip.frames for clip in target]) if options.reference == "paired" else None
+        self._paired_rows = _padded([clip.frames for clip in target]) if paired else None
 
     @property
     def longest(self) -> int:
@@ -174,12 +181,19 @@ class Repertoire:
 
 
 def _body(motions: Motions, body: object, what: str, *, needed: bool = True) -> Embodiment:
+    if not isinstance(body, Embodiment) and str(body) not in motions.bodies and is_robot_file(body):
+        body = catalog.resolve(str(body))
     name = body.name if isinstance(body, Embodiment) else str(body)
     if name in motions.bodies:
         found = motions.bodies[name]
         if isinstance(body, Embodiment) and body != found:
             raise EmbodimentError(f"{what} {name!r} differs from the body of that name in {motions.name}")
         return found
+    if needed and what == "robot" and (isinstance(body, Embodiment) or name in catalog.names()):
+        raise EmbodimentError(
+            f"robot={name!r}: {motions.name} has no motion of it; pass reference='mapped' to track what the mapping "
+            "makes of the operator"
+        )
     if needed:
         raise EmbodimentError(
             f"{what}={name!r}: {motions.name} has no motion of it; {nearest_name(name, motions.bodies)}"
@@ -188,11 +202,15 @@ def _body(motions: Motions, body: object, what: str, *, needed: bool = True) -> 
     return catalog.resolve(body)  # type: ignore[arg-type]
 
 
+def _together(motions: Motions, operator: str, robot: str) -> bool:
+    return any(operator in take.frames and robot in take.frames for take in motions.takes)
+
+
 def _clips(
-    motions: Motions, options: TeleopOptions, operator: str, robot: str
+    motions: Motions, options: TeleopOptions, operator: str, robot: str, paired: bool
 ) -> tuple[list[MotionClip], list[MotionClip]]:
     """The chosen clips of operator and robot at the control rate; of the robot none if it has no reference motion."""
-    bodies = [operator, robot] if options.reference == "paired" else [operator]
+    bodies = [operator, robot] if paired else [operator]
     takes = [take for take in motions.takes if all(body in take.frames for body in bodies)]
     if not takes:
         raise MotionError(
@@ -203,7 +221,7 @@ def _clips(
     used = replace(motions, takes=tuple(_only(take, bodies) for take in takes))
     used = resampled(used, float(options.control_hz))
     source = list(used.clips(operator))
-    return source, list(used.clips(robot)) if options.reference == "paired" else []
+    return source, list(used.clips(robot)) if paired else []
 
 
 def _chosen(takes: list[Take], options: TeleopOptions) -> list[Take]:

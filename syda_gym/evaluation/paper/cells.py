@@ -51,7 +51,8 @@ class Contender:
 
 
 CONTENDERS = (
-    Contender("syda", "general", bounds=2, cost=4.0),
+    Contender("syda", "general", seeded=False, bounds=1, cost=2.0),
+    Contender("syda", "synergies", bounds=2, cost=4.0),
     Contender("syda", "nested", bounds=1, cost=4.0),
     Contender("syda", "accurate", bounds=1, cost=4.0),
     Contender("syda", "paper", cost=9.0),

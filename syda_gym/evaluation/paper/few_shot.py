@@ -37,6 +37,8 @@ class FewShotRow:
         chain_spread: its standard deviation over draws of the actions [m].
         direct: mean landmark error of the direct pair [m].
         direct_spread: its standard deviation over draws [m].
+        geometric: the direct pair again, of which a rotation alone is learned [m].
+        geometric_spread: its standard deviation over draws [m].
     """
 
     count: int
@@ -44,6 +46,8 @@ class FewShotRow:
     chain_spread: float
     direct: float
     direct_spread: float
+    geometric: float
+    geometric_spread: float
 
 
 def few_shot(
@@ -59,8 +63,9 @@ def few_shot(
     """Compares the chain newcomer > known > robot with the direct pair newcomer > robot.
 
     The chain's link into the robot is fitted to all of the known body's recordings except the scored action; its hop is
-    fitted to k actions of newcomer and known body. The direct pair is fitted to k actions, none of them the scored one.
-    Mappings are of the ``general`` preset.
+    fitted to k actions of newcomer and known body. The direct pair is fitted to k actions, none of them the scored one:
+    once by the ``general`` preset as the chain is, whose geometric prior makes it the fair rival, and once as geometry
+    alone, after a rotation that is fitted to the same actions.
 
     Args:
         motions: with the three pairs.
@@ -97,10 +102,10 @@ def few_shot(
         if progress is not None:
             progress(place / len(tried))
         chains = _chain_errors(hop_pair, links, tests, count, draws)
-        direct = _direct_errors(end, tests, count, draws)
-        rows.append(
-            FewShotRow(count, float(chains.mean()), float(chains.std()), float(direct.mean()), float(direct.std()))
-        )
+        direct = _direct_errors(end, tests, count, draws, "syda")
+        geometric = _direct_errors(end, tests, count, draws, "geometric")
+        figures = [float(value) for errors in (chains, direct, geometric) for value in (errors.mean(), errors.std())]
+        rows.append(FewShotRow(count, *figures))
     return rows
 
 
@@ -117,7 +122,9 @@ def _chain_errors(
     return np.array([_score({name: hop >> link for name, link in links.items()}, tests) for hop in hops])
 
 
-def _direct_errors(end: PairedMotions, tests: dict[str, PairedMotions], count: int, draws: int) -> FloatArray:
+def _direct_errors(
+    end: PairedMotions, tests: dict[str, PairedMotions], count: int, draws: int, method: str
+) -> FloatArray:
     """Mean error of the direct pair per draw, ``(draws,)`` [m]."""
     pairs, seeds = [], []
     for draw in range(draws):
@@ -125,7 +132,7 @@ def _direct_errors(end: PairedMotions, tests: dict[str, PairedMotions], count: i
             others = [other for other in end.action_names if other != name]
             pairs.append(end.only_actions(_draw(others, count, draw, number)))
             seeds.append(draw)
-    fitted = iter(fit_many(pairs, seeds=seeds, confidence=False))
+    fitted = iter(fit_many(pairs, method, seeds=seeds, confidence=False))
     return np.array([_score({name: next(fitted) for name in tests}, tests) for _ in range(draws)])
 
 

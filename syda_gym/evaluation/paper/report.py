@@ -108,16 +108,24 @@ def _few_shot(study: Study) -> Table:
             str(row["count"]),
             f"{row['chain']:.4f} ± {row['chain_spread']:.4f}",
             f"{row['direct']:.4f} ± {row['direct_spread']:.4f}",
+            f"{row['geometric']:.4f} ± {row['geometric_spread']:.4f}",
         ]
         for newcomer, found in sorted(study.few_shot.items())
         for row in found
     ]
     return Table(
         "Few recordings: k paired actions of a new body, E (m), LOAO",
-        [Column("chain"), Column("k"), Column("chain E"), Column("direct pair E")],
+        [
+            Column("chain"),
+            Column("k"),
+            Column("chain E"),
+            Column("direct pair E"),
+            Column("geometry alone E"),
+        ],
         rows,
         note="syda/general, mean ± s.d. over draws of the k actions. Chain: k actions of the new body with the known "
-        "one, whose link into the robot lacks the scored action. Direct pair: k other actions with the robot.",
+        "one, whose link into the robot lacks the scored action. Direct pair: k other actions with the robot; geometry "
+        "alone learns a rotation from them.",
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -136,11 +137,12 @@ class _RobotModel:
         from syda_gym.embodiments.kinematics.urdf import read_urdf
 
         self._robot = robot
-        self._model = read_urdf(robot.urdf).model
+        tree = read_urdf(robot.urdf)
+        self._model = tree.model
         self._data = self._model.createData()
-        urdf = yourdfpy.URDF.load(
-            str(robot.urdf), build_scene_graph=False, load_meshes=False, build_collision_scene_graph=False
-        )
+        # What is no URDF is shown by the shapes that it collides with.
+        source = str(robot.urdf) if robot.urdf.suffix.lower() == ".urdf" else io.BytesIO(tree.xml.encode())
+        urdf = yourdfpy.URDF.load(source, build_scene_graph=False, load_meshes=False, build_collision_scene_graph=False)
         rest = self.place(robot.rest)
         probe = self.place(np.clip(robot.rest + 0.3, robot.lower, robot.upper))
         self.links = [name for name in rest if name in urdf.link_map and not np.allclose(rest[name], probe[name])]

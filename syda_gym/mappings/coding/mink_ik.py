@@ -39,6 +39,11 @@ class MinkArmCoder(RobotArmCoder):
         except ImportError as error:
             raise MissingExtraError("the mink inverse kinematics baseline", "ik") from error
         self._mink = mink
+        if self.robot.urdf.suffix.lower() != ".urdf" or any(arm.offsets for arm in self.robot.description.arms):
+            raise EmbodimentError(
+                f"mink looks for shoulder, elbow and wrist at the origins of links of a URDF, and those of "
+                f"{self.robot.name!r} lie elsewhere; use method='geometric'"
+            )
         try:
             self._model = mujoco.MjModel.from_xml_path(str(self.robot.urdf))
         except ValueError as error:

@@ -10,9 +10,10 @@ from syda_gym.errors import MappingError, OptionError, nearest_name
 from syda_gym.mappings.coded_mapping import CodedMapping
 from syda_gym.mappings.methods.classic import fit_accurate, fit_kernel_ridge, fit_nearest, fit_ridge
 from syda_gym.mappings.methods.direct import fit_direct_paper
-from syda_gym.mappings.methods.general import fit_direct_general, fit_general, fit_interpolation, fit_nested
+from syda_gym.mappings.methods.general import fit_direct_general, fit_interpolation, fit_nested, fit_synergies
 from syda_gym.mappings.methods.geometric import fit_fixed_axes, fit_mink, fit_procrustes
 from syda_gym.mappings.methods.jobs import FitJob, Fitter, check_pair
+from syda_gym.mappings.methods.prior import fit_general
 from syda_gym.mappings.methods.syda import fit_paper
 from syda_gym.mappings.models.autoencoder_training import Progress
 from syda_gym.motions.clip import PairedMotions
@@ -46,6 +47,7 @@ METHODS: dict[str, Method] = {
     "syda": Method(
         {
             "general": fit_general,
+            "synergies": fit_synergies,
             "nested": fit_nested,
             "accurate": fit_accurate,
             "interpolation": fit_interpolation,

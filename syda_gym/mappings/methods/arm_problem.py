@@ -23,7 +23,7 @@ from syda_gym.mappings.models.heads import HeadedRegressor, fit_head
 from syda_gym.mappings.models.regressors import Regressor
 from syda_gym.motions.clip import PairedMotions
 
-__all__ = ["ArmCoder", "ArmProblem", "Coding", "RowFitter", "action_groups", "fit_problems"]
+__all__ = ["ArmCoder", "ArmProblem", "Coding", "RowFitter", "action_groups", "fit_problems", "thinned", "upper_share"]
 
 ArmCoder = HumanArmCoder | RobotArmCoder | WindowCoder
 RowFitter = Callable[[Sequence["ArmProblem"]], list[Regressor]]
@@ -59,6 +59,8 @@ class ArmProblem:
         target_coder: calibrated to the training frames.
         source: codes ``(N, K, D)``.
         target: codes ``(N, K, E)``, lag removed.
+        unshifted: the target's codes as recorded, for the way back: there the lag of a mimicking person is no error of
+            the mapping that could be told from the frames.
         lags: recording to shift [frames].
     """
 
@@ -68,6 +70,7 @@ class ArmProblem:
     target_coder: ArmCoder
     source: FloatArray
     target: FloatArray
+    unshifted: FloatArray
     lags: dict[str, int]
 
     @classmethod
@@ -91,7 +94,7 @@ class ArmProblem:
         source, target = encode_clips(source_coder, pair), target_coder.encode(pair.target)
         lags = estimate_lags(pair, source, target[..., :6], coding.max_lag if mimicry else 0)
         shifted = shift_targets(pair, target, lags)
-        return cls(pair, seed, source_coder, target_coder, source, shifted, lags)
+        return cls(pair, seed, source_coder, target_coder, source, shifted, target, lags)
 
     @property
     def main(self) -> tuple[FloatArray, FloatArray]:
@@ -102,13 +105,32 @@ class ArmProblem:
     def rows(self) -> tuple[FloatArray, FloatArray]:
         """Main codes arm by arm, ``(N * K, D)`` and ``(N * K, E)``; thinned if very many."""
         x, y = self.main
-        step = -(-len(x) * x.shape[1] // _MAX_ROWS)
-        return x[::step].reshape(-1, x.shape[-1]), y[::step].reshape(-1, y.shape[-1])
+        return thinned(x), thinned(y)
+
+    @property
+    def main_back(self) -> tuple[FloatArray, FloatArray]:
+        """Codes for the way back, ``(N, K, E)`` as recorded and ``(N, K, D)``; of a window the current frame alone."""
+        x = self.main[0]
+        if isinstance(self.source_coder, WindowCoder):
+            x = x[..., -self.source_coder.inner.width :]
+        return self.unshifted[..., : main_width(self.target_coder)], x
 
 
 def main_width(coder: ArmCoder) -> int:
     """Width of a code without the extra joints of a robot."""
     return 6 if isinstance(coder, RobotArmCoder) else coder.width
+
+
+def thinned(codes: FloatArray, most: int = _MAX_ROWS) -> FloatArray:
+    """Codes ``(N, K, D)`` arm by arm ``(rows, D)``, every so manieth frame if there are more than ``most`` rows."""
+    rows = codes[:: -(-codes.shape[0] * codes.shape[1] // most)]
+    return rows.reshape(-1, rows.shape[-1])
+
+
+def upper_share(coder: ArmCoder) -> float:
+    """The upper arm's share of a human's arm length, 0 for a robot, whose code holds directions alone."""
+    human = coder.inner if isinstance(coder, WindowCoder) else coder
+    return float(human.lengths[0] / human.lengths.sum()) if isinstance(human, HumanArmCoder) else 0.0
 
 
 def fit_problems(
@@ -147,6 +169,9 @@ def fit_problems(
     result = []
     for job, problem, group in zip(jobs, problems, groups, strict=True):
         card = card_of(job.pair, method, job.preset, job.seed, job.options)
+        if not group:
+            why = "one action" if confidence else "none was asked for"
+            card = replace(card, note=f"no error bound: {why}")
         mapping = CodedMapping(card, *parts[id(problem)])
         if confidence:
             tests = [(job.pair.only_actions(actions), CodedMapping(card, *next(trials))) for actions in group]

@@ -25,11 +25,11 @@ __all__ = [
     "GENERAL",
     "INTERPOLATION",
     "fit_direct_general",
-    "fit_general",
     "fit_hops",
     "fit_interpolation",
     "fit_nested",
     "fit_networks",
+    "fit_synergies",
     "take_options",
 ]
 
@@ -68,7 +68,7 @@ _RECIPE = Choice()
 _ROWS_PER_STEP = 32
 
 
-def fit_general(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
+def fit_synergies(jobs: Sequence[FitJob], progress: Progress | None = None) -> list[CodedMapping]:
     """SyDa with shared arms, low capacity, cross losses and lag compensation; between humans a hop.
 
     Options: ``lag`` (largest lag searched for, 6 frames), ``window`` (past frames that a human's code shows, 0),

@@ -10,17 +10,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import MappingError, OptionError
 from syda_gym.mappings.coded_mapping import CodedMapping
-from syda_gym.mappings.coding.arm_coders import HumanArmCoder
 from syda_gym.mappings.coding.mink_ik import MinkArmCoder
-from syda_gym.mappings.methods.arm_problem import ArmCoder, ArmProblem, Coding, fit_problems
+from syda_gym.mappings.methods.arm_problem import ArmProblem, Coding, fit_problems, upper_share
 from syda_gym.mappings.methods.general import take_options
 from syda_gym.mappings.methods.jobs import FitJob
 from syda_gym.mappings.models.autoencoder_training import Progress
 from syda_gym.mappings.models.regressors import Regressor
-from syda_gym.mappings.models.rotation import GeometricRegressor
+from syda_gym.mappings.models.rotation import GeometricRegressor, fitted_rotation
 
 __all__ = ["fit_fixed_axes", "fit_mink", "fit_procrustes"]
 
@@ -69,17 +67,5 @@ def _fit(jobs: Sequence[FitJob], method: str, calibrated: bool, confidence: bool
 
 def _regressor(problem: ArmProblem, calibrated: bool) -> GeometricRegressor:
     source, target = problem.rows
-    rotation = _kabsch(source[:, -6:].reshape(-1, 3), target[:, -6:].reshape(-1, 3)) if calibrated else np.eye(3)
-    return GeometricRegressor(rotation, _share(problem.source_coder), _share(problem.target_coder))
-
-
-def _share(coder: ArmCoder) -> float:
-    return float(coder.lengths[0] / coder.lengths.sum()) if isinstance(coder, HumanArmCoder) else 0.0
-
-
-def _kabsch(source: FloatArray, target: FloatArray) -> FloatArray:
-    """The rotation that turns source vectors onto target vectors with least squares (Kabsch 1976)."""
-    u, _, vt = np.linalg.svd(target.T @ source)
-    sign = np.sign(np.linalg.det(u @ vt))
-    rotation: FloatArray = u @ np.diag([1.0, 1.0, sign]) @ vt
-    return rotation
+    rotation = fitted_rotation(source[:, -6:], target[:, -6:]) if calibrated else np.eye(3)
+    return GeometricRegressor(rotation, upper_share(problem.source_coder), upper_share(problem.target_coder))

@@ -16,11 +16,20 @@ import numpy as np
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.mappings.coding.arm_coders import HumanArmCoder
 from syda_gym.mappings.coding.window_coder import WindowCoder
-from syda_gym.mappings.methods.arm_problem import ArmCoder, ArmProblem, action_groups
+from syda_gym.mappings.methods.arm_problem import ArmCoder, ArmProblem, action_groups, thinned
 from syda_gym.mappings.models.linear import Ridge
 from syda_gym.mappings.models.scaling import Scaler
+from syda_gym.motions.clip import PairedMotions
 
-__all__ = ["HOP_SHRINKAGES", "NOISES", "Choice", "choose_hop_shrinkage", "choose_input"]
+__all__ = [
+    "HOP_SHRINKAGES",
+    "LEAST_ACTIONS",
+    "NOISES",
+    "Choice",
+    "choose_hop_shrinkage",
+    "choose_input",
+    "held_out_gaps",
+]
 
 NOISES = (0.1, 0.2, 0.3, 0.45, 0.7, 1.0)
 """Candidates for the input noise, in standard deviations; fixed in advance."""
@@ -29,7 +38,9 @@ HOP_SHRINKAGES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Candidates for the penalty of a hop between bodies of one kind, weakest first; fixed in advance."""
 
 _FALLBACK_SHRINKAGE = 10.0
-_LEAST_ACTIONS = 3
+LEAST_ACTIONS = 3
+"""With fewer there is nothing to choose by."""
+
 _MAX_ROWS = 2000
 
 
@@ -52,8 +63,8 @@ class Choice:
 
 CHOICES = tuple(Choice(noise, by_vector) for by_vector in (False, True) for noise in NOISES)
 
-Predict = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
-"""Fits inputs to outputs and predicts the outputs of further inputs."""
+Predict = Callable[[FloatArray, FloatArray, FloatArray], Sequence[FloatArray]]
+"""Fits inputs to outputs and predicts the outputs of further inputs, once for each candidate."""
 
 
 def choose_input(problem: ArmProblem) -> Choice:
@@ -63,9 +74,8 @@ def choose_input(problem: ArmProblem) -> Choice:
     larger than robots. The recipe's own choice with fewer than three actions.
     """
     source, target = problem.main
-    stand_ins = [_ridge(choice) for choice in CHOICES]
-    there = _errors(problem, source, target, problem.target_coder, stand_ins)
-    back = _errors(problem, target, source, problem.source_coder, stand_ins)
+    there = held_out_gaps(problem.pair, source, target, problem.target_coder, _stand_ins)
+    back = held_out_gaps(problem.pair, target, source, problem.source_coder, _stand_ins)
     if there is None or back is None:
         return Choice()
     return CHOICES[int(np.argmin(sum(way.mean(axis=1) / way.mean(axis=1).min() for way in (there, back))))]
@@ -78,8 +88,7 @@ def choose_hop_shrinkage(problem: ArmProblem) -> float:
     ruins the chain that it is part of, which the pair's own frames cannot tell.
     """
     source, target = problem.main
-    hops = [_hop(shrinkage) for shrinkage in HOP_SHRINKAGES]
-    errors = _errors(problem, source, target, problem.target_coder, hops)
+    errors = held_out_gaps(problem.pair, source, target, problem.target_coder, _hops)
     if errors is None:
         return _FALLBACK_SHRINKAGE
     means = errors.mean(axis=1)
@@ -88,35 +97,39 @@ def choose_hop_shrinkage(problem: ArmProblem) -> float:
     return max(value for value, mean in zip(HOP_SHRINKAGES, means, strict=True) if mean <= limit)
 
 
-def _ridge(choice: Choice) -> Predict:
-    return lambda x, y, new: Ridge.fit(x, y, choice.noise**2, scale=choice.scale(x))(new)
-
-
-def _hop(shrinkage: float) -> Predict:
-    return lambda x, y, new: new + Ridge.fit(x, y - x, shrinkage)(new)
-
-
-def _errors(
-    problem: ArmProblem, source: FloatArray, target: FloatArray, coder: ArmCoder, candidates: Sequence[Predict]
+def held_out_gaps(
+    pair: PairedMotions, source: FloatArray, target: FloatArray, coder: ArmCoder, predict: Predict
 ) -> FloatArray | None:
-    """Landmark errors ``(candidates, groups)`` [m] on training actions held out in turn, ``None`` with too few."""
-    groups = action_groups(problem.pair)
-    if len(groups) < _LEAST_ACTIONS:
+    """Landmark errors of candidates on training actions that are held out in turn.
+
+    Args:
+        pair: the training frames.
+        source: inputs of each row ``(N, K, D)``.
+        target: outputs of each row ``(N, K, E)``.
+        coder: of the outputs.
+        predict: fits every candidate and predicts with it.
+
+    Returns:
+        ``(candidates, groups)`` [m], ``None`` with fewer than three actions.
+    """
+    groups = action_groups(pair)
+    if len(groups) < LEAST_ACTIONS:
         return None
-    errors = np.empty((len(candidates), len(groups)))
-    for column, names in enumerate(groups):
-        held_out = np.isin(problem.pair.actions, names)
-        x, y = (_thinned(codes[~held_out]) for codes in (source, target))
-        new, wanted = (_thinned(codes[held_out]) for codes in (source, target))
-        for row, predict in enumerate(candidates):
-            errors[row, column] = _gap(coder, predict(x, y, new), wanted)
-    return errors
+    columns = []
+    for names in groups:
+        held_out = np.isin(pair.actions, names)
+        x, y = (thinned(codes[~held_out], _MAX_ROWS) for codes in (source, target))
+        new, wanted = (thinned(codes[held_out], _MAX_ROWS) for codes in (source, target))
+        columns.append([_gap(coder, predicted, wanted) for predicted in predict(x, y, new)])
+    return np.array(columns).T
 
 
-def _thinned(codes: FloatArray) -> FloatArray:
-    """Codes arm by arm ``(rows, D)``, at most about 2000 rows."""
-    rows = codes[:: -(-codes.shape[0] * codes.shape[1] // _MAX_ROWS)]
-    return rows.reshape(-1, rows.shape[-1])
+def _stand_ins(x: FloatArray, y: FloatArray, new: FloatArray) -> list[FloatArray]:
+    return [Ridge.fit(x, y, choice.noise**2, scale=choice.scale(x))(new) for choice in CHOICES]
+
+
+def _hops(x: FloatArray, y: FloatArray, new: FloatArray) -> list[FloatArray]:
+    return [new + Ridge.fit(x, y - x, shrinkage)(new) for shrinkage in HOP_SHRINKAGES]
 
 
 def _gap(coder: ArmCoder, predicted: FloatArray, wanted: FloatArray) -> float:

@@ -27,8 +27,9 @@ from syda_gym.look import (
 from syda_gym.simulation.landmark_kinematics import LandmarkKinematics
 from syda_gym.simulation.pictures.frustum import Frustum, PictureWindow
 from syda_gym.simulation.pictures.scene import Marker, PosedRobot, PosedSkeleton, floor_below
+from syda_gym.simulation.pictures.stage import Stage
 
-__all__ = ["GHOST_COLOR", "MARKER_RADIUS", "OPERATOR_AT", "Camera", "CameraView", "Picture", "error_color"]
+__all__ = ["GHOST_COLOR", "Camera", "CameraView", "Picture", "error_color"]
 
 Picture = NDArray[np.uint8]
 
@@ -36,8 +37,6 @@ GHOST_COLOR = rgba(REFERENCE)
 _GHOST_SHARE = 0.45
 _GHOST_FINEST = 0.012  # m; a ghost has no fingers, which are most of the triangles
 _GHOST_GAP = 2e-5  # of depth, so that a ghost that coincides with the robot does not flicker
-OPERATOR_AT = 0.95  # m to the robot's left
-MARKER_RADIUS = 0.046
 _GIRTH = 0.15  # m around the origins of links that their shapes are looked for in; grows where it proves too little
 
 
@@ -48,7 +47,7 @@ class CameraView:
     Attributes:
         width: of the picture [pixels].
         height: of the picture [pixels].
-        distance: from the camera to what it looks at [m].
+        distance: from the camera to what it looks at [m]; ``None`` for as far as it takes to show everything.
         yaw: 0 looks at the robot's face, positive from its left [degrees].
         pitch: positive looks down [degrees].
         fov: vertical field of view [degrees].
@@ -64,7 +63,7 @@ class CameraView:
 
     width: int = 480
     height: int = 360
-    distance: float = 3.0
+    distance: float | None = None
     yaw: float = 0.0
     pitch: float = 8.0
     fov: float = 42.0
@@ -80,6 +79,8 @@ class CameraView:
             ("pitch", -89.0, 89.0), ("fov", 5.0, 120.0), ("error_scale", 1e-4, 10.0),
         ):  # fmt: skip
             value = getattr(self, name)
+            if name == "distance" and value is None:
+                continue
             if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not low <= value <= high:
                 raise OptionError(f"camera {name} must lie between {low} and {high}, got {value!r}")
 
@@ -123,6 +124,7 @@ class Camera:
         self._robot, self._operator = robot, operator if view.operator else None
         self._clients: list[int] = []
         self._girth = _GIRTH
+        self.stage = Stage(robot, self._operator, view.fov, view.width / view.height, view.distance)
         self._landmarks = LandmarkKinematics(robot)
         try:
             self._solid = self._connect()
@@ -130,7 +132,7 @@ class Camera:
             self._puppet = PosedRobot(robot, self._solid, urdf=view.appearance)
             self._puppet.hide(self._puppet.still)
             self._skeleton = self._add_operator(self._solid, moving=True)
-            self._markers = [Marker(self._solid, MARKER_RADIUS) for _ in robot.landmark_names] if view.error else []
+            self._markers = [Marker(self._solid, self.stage.marker) for _ in robot.landmark_names] if view.error else []
             self._ghost: PosedRobot | None = None
             if view.ghost:
                 self._ghost_client = self._connect()
@@ -229,25 +231,23 @@ class Camera:
         if self._operator is None:
             return None
         if isinstance(self._operator, HumanSkeleton):
-            return PosedSkeleton(self._operator, client, (0.0, OPERATOR_AT, self._floor), moving)
+            return PosedSkeleton(self._operator, client, (0.0, self.stage.operator_at, self._floor), moving)
         if not isinstance(self._operator, Robot):
             return None
-        body = PosedRobot(self._operator, client, (0.0, OPERATOR_AT, 0.0))
+        body = PosedRobot(self._operator, client, (0.0, self.stage.operator_at, 0.0))
         rise = self._floor - body.lowest()
         body.remove()
-        body = PosedRobot(self._operator, client, (0.0, OPERATOR_AT, rise))
+        body = PosedRobot(self._operator, client, (0.0, self.stage.operator_at, rise))
         body.hide(body.still if moving else body.moving)
         return body
 
     def _aim(self, puppet: PosedRobot) -> None:
         """Looks at the middle of what stands there."""
-        view = self.view
-        side = 0.5 * OPERATOR_AT if self._operator is not None else 0.0
-        height = max(self._robot.height, self._operator.height if self._operator is not None else 0.0)
-        center = np.array([0.0, side, self._floor + 0.56 * height])  # raised hands need room
+        view, stage = self.view, self.stage
+        center = stage.center(self._floor)
         yaw, pitch = np.radians(view.yaw), np.radians(view.pitch)
         away = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
-        self._frustum = Frustum(center + view.distance * away, center, view.fov, view.width, view.height)
+        self._frustum = Frustum(center + stage.distance * away, center, view.fov, view.width, view.height)
 
     def _look(
         self, client: int, points: FloatArray, behind: NDArray[np.float32]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Sequence
 from typing import Any
@@ -11,11 +12,17 @@ import numpy as np
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.figure import bones, figure_points
 from syda_gym.embodiments.human import HumanSkeleton
+from syda_gym.embodiments.kinematics.urdf import read_urdf
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import EmbodimentError
 from syda_gym.look import GROUND, PERSON
+from syda_gym.simulation.plain_body import plain_body, shapes_at_rest
+from syda_gym.simulation.quiet import quiet
 
 __all__ = ["Marker", "PosedRobot", "PosedSkeleton", "floor_below"]
+
+_logger = logging.getLogger("syda_gym.simulation")
+_told: set[str] = set()  # files whose missing meshes were told of
 
 _AWAY = (0.0, 0.0, -1000.0)
 _HIDDEN = (1.0, 1.0, 1.0, 0.0)
@@ -45,8 +52,17 @@ class PosedRobot:
 
         self._bullet, self._client = pybullet, client
         path = os.fspath(urdf or robot.urdf)
+        tree = read_urdf(path)
+        for name in robot.joint_names:
+            if name not in tree.joints:
+                raise EmbodimentError(f"{path} has no joint {name!r}; it does not show a {robot.name!r}")
+        plain = plain_body(robot, ("visual",), tree if urdf else None)
+        if plain.missing and path not in _told:
+            _told.add(path)
+            _logger.warning("%s: %d meshes are not there; what shows nothing is drawn as sticks", path, plain.missing)
         try:
-            self.body: int = pybullet.loadURDF(path, useFixedBase=True, physicsClientId=client)
+            with plain.file(path) as shown, quiet(robot.name):
+                self.body: int = pybullet.loadURDF(shown, useFixedBase=True, physicsClientId=client)
         except pybullet.error as error:
             raise EmbodimentError(f"PyBullet cannot load {path}: {error}; check the file and its meshes") from error
         rows = [
@@ -54,9 +70,6 @@ class PosedRobot:
             for joint in range(pybullet.getNumJoints(self.body, physicsClientId=client))
         ]
         joints = {row[1].decode(): row[0] for row in rows}
-        for name in robot.joint_names:
-            if name not in joints:
-                raise EmbodimentError(f"{path} has no joint {name!r}; it does not show a {robot.name!r}")
         self._arms = [joints[name] for name in robot.joint_names]
         self._links = {row[12].decode(): row[0] for row in rows}
         parents = {row[0]: row[16] for row in rows}
@@ -65,7 +78,9 @@ class PosedRobot:
         for name, angle in robot.description.rest.items():
             if name in joints:
                 pybullet.resetJointState(self.body, joints[name], angle, physicsClientId=client)
-        self._put_torso(self._links.get(robot.description.torso, -1), place)
+        self._put_torso(-1 if plain.torso is None else self._links.get(plain.torso, -1), place)
+        # Boxes around links without collision shapes are empty: what is lowest then follows from the shapes.
+        self._lowest = None if plain.torso else float(shapes_at_rest(robot, tree)[:, 2].min()) + float(place[2])
 
     def pose(self, q: FloatArray) -> None:
         """Takes joint angles ``(n,)`` [rad]."""
@@ -104,7 +119,9 @@ class PosedRobot:
             self._bullet.changeVisualShape(self.body, link, rgbaColor=color, physicsClientId=self._client)
 
     def lowest(self) -> float:
-        """Height of its lowest point [m]."""
+        """Height of its lowest point at rest [m]."""
+        if self._lowest is not None:
+            return self._lowest
         boxes = [
             self._bullet.getAABB(self.body, link, physicsClientId=self._client) for link in [-1, *self._links.values()]
         ]

@@ -11,8 +11,9 @@ from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
-from syda_gym.simulation.pictures.camera import GHOST_COLOR, MARKER_RADIUS, OPERATOR_AT, CameraView, error_color
+from syda_gym.simulation.pictures.camera import GHOST_COLOR, CameraView, error_color
 from syda_gym.simulation.pictures.scene import Marker, PosedRobot, PosedSkeleton, floor_below
+from syda_gym.simulation.pictures.stage import Stage
 
 __all__ = ["Window", "has_display"]
 
@@ -55,20 +56,19 @@ class Window:
             self._ghost = PosedRobot(robot, self._client, urdf=view.appearance)
             self._ghost.paint((*GHOST_COLOR[:3], 0.4))
             self._ghost.hide(self._ghost.still)
+        stage = Stage(robot, operator if view.operator else None, view.fov, view.width / view.height, view.distance)
         self._operator: PosedSkeleton | PosedRobot | None = None
         if view.operator and isinstance(operator, HumanSkeleton):
-            self._operator = PosedSkeleton(operator, self._client, (0.0, OPERATOR_AT, floor))
+            self._operator = PosedSkeleton(operator, self._client, (0.0, stage.operator_at, floor))
         elif view.operator and isinstance(operator, Robot):
-            self._operator = PosedRobot(operator, self._client, (0.0, OPERATOR_AT, 0.0))
-        self._markers = [Marker(self._client, MARKER_RADIUS) for _ in robot.landmark_names] if view.error else []
+            self._operator = PosedRobot(operator, self._client, (0.0, stage.operator_at, 0.0))
+        self._markers = [Marker(self._client, stage.marker) for _ in robot.landmark_names] if view.error else []
         floor_below(self._client, floor)
-        shown = [robot] if self._operator is None else [robot, operator]
-        height = max(body.height for body in shown if isinstance(body, Robot | HumanSkeleton))
-        middle = (0.0, 0.0 if self._operator is None else 0.5 * OPERATOR_AT, floor + 0.56 * height)
+        middle = tuple(stage.center(floor).tolist())
         # The viewer's field of view is its own; from nearer it shows what the camera does.
         nearer = math.tan(math.radians(0.5 * view.fov)) / math.tan(math.radians(0.5 * _FOV))
         pybullet.resetDebugVisualizerCamera(
-            nearer * view.distance, 90.0 + view.yaw, -view.pitch, middle, physicsClientId=self._client
+            nearer * stage.distance, 90.0 + view.yaw, -view.pitch, middle, physicsClientId=self._client
         )
         self._next = time.monotonic()
 

@@ -99,11 +99,7 @@ class BulletSink(Sink):
             raise OptionError(
                 "the sink 'window' needs a display ($DISPLAY is not set); use 'bullet' or 'video:FILE.mp4'"
             )
-        shown = {"operator": False, "distance": 1.6 * self.robot.height}
-        if self.operator is not None:
-            tall = max(float(getattr(body, "height", 1.0)) for body in (self.robot, self.operator))
-            shown = {"operator": True, "distance": max(3.0, 1.75 * tall)}
-        view = CameraView.resolve({**shown, **self.camera})
+        view = CameraView.resolve({"operator": self.operator is not None, **self.camera})
         if self.window:
             self._eye = Window(self.robot, self.operator or self.robot, view, float(self.rates.control_hz))
         elif self.video is not None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.kinematics.urdf import UrdfTree, configuration, read_urdf
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
 from syda_gym.teleoperation.safety.clearance import Clearance
@@ -19,6 +21,7 @@ _SAMPLES = 256
 _SMALL = 1e-3  # rad
 _STEP = 0.1  # rad; how far apart the tested poses of a way may be
 _FEW = 24  # pairs; looking at more of them one by one takes as long as looking at all
+_LARGE = 500  # vertices of a mesh
 _ALWAYS = 0.5  # pairs that touch in more than this share of random poses overlap by construction
 
 
@@ -32,6 +35,7 @@ class SelfCollision:
     Args:
         robot: whose shapes.
         margin: distance [m] below which two links count as touching.
+        samples: random poses in which pairs that overlap by construction are told from others.
 
     Attributes:
         available: false when the URDF has no collision shape that could be read; then nothing is checked, and
@@ -44,7 +48,7 @@ class SelfCollision:
         OptionError: ``margin`` is negative.
     """
 
-    def __init__(self, robot: Robot, margin: float = 0.005) -> None:
+    def __init__(self, robot: Robot, margin: float = 0.005, *, samples: int = _SAMPLES) -> None:
         if margin < 0.0:
             raise OptionError(f"self-collision margin must not be negative, got {margin} m")
         self.robot = robot
@@ -62,7 +66,7 @@ class SelfCollision:
         else:
             self._index, self._turns = _indices(self._model, robot)
             self._configuration = np.zeros(self._model.nq)
-            self._choose_pairs()
+            self._choose_pairs(samples)
             self._clearance = Clearance(robot, self._model, self._shapes, margin)
             self.pairs = len(self._shapes.collisionPairs)
             if not self.pairs:
@@ -181,7 +185,7 @@ class SelfCollision:
         self._pin.computeCollisions(self._model, self._data, self._shapes, self._shape_data, self._full(angles), False)
         return [result.isCollision() for result in self._shape_data.collisionResults]
 
-    def _choose_pairs(self) -> None:
+    def _choose_pairs(self, samples: int) -> None:
         shapes = self._shapes
         shapes.addAllCollisionPairs()
         disabled = {frozenset(pair) for pair in self.robot.description.disabled_collisions}
@@ -199,7 +203,7 @@ class SelfCollision:
             ]
         )
         rng = np.random.default_rng(0)
-        poses = self.robot.clamp(rng.uniform(self.robot.lower, self.robot.upper, (_SAMPLES, len(self.robot.lower))))
+        poses = self.robot.clamp(rng.uniform(self.robot.lower, self.robot.upper, (samples, len(self.robot.lower))))
         frequency = np.mean([self._hits(pose) for pose in poses], axis=0)
         # Pairs within the margin at rest would never let the robot start.
         left_out = (frequency > _ALWAYS) | np.array(self._hits(self.robot.rest), dtype=bool)
@@ -264,19 +268,25 @@ def _arm_model(robot: Robot) -> tuple[Any, Any]:
     """Pinocchio's model and collision shapes with every joint but the arms' locked at rest."""
     import pinocchio
 
-    model = pinocchio.buildModelFromUrdf(str(robot.urdf))
-    folders = [str(folder) for folder in robot.urdf.parents[:5]]
-    shapes = pinocchio.buildGeomFromUrdf(model, str(robot.urdf), pinocchio.GeometryType.COLLISION, package_dirs=folders)
-    configuration = pinocchio.neutral(model)
-    for name, angle in robot.description.rest.items():
-        if model.existJointName(name) and model.joints[model.getJointId(name)].nq == 1:
-            configuration[model.joints[model.getJointId(name)].idx_q] = angle
-    locked = [model.getJointId(name) for name in model.names if name not in ("universe", *robot.joint_names)]
+    tree = read_urdf(robot.urdf)
+    shapes = _whole_shapes(tree)
+    still = {name: angle for name, angle in robot.description.rest.items() if name not in robot.joint_names}
+    kept_names = {"universe", *(tree.model_joints[name] for name in robot.joint_names)}
+    locked = [tree.model.getJointId(name) for name in tree.model.names if name not in kept_names]
+    reduced, kept = pinocchio.buildReducedModel(tree.model, shapes, locked, configuration(tree, still))
+    return reduced, kept
+
+
+@lru_cache(maxsize=4)
+def _whole_shapes(tree: UrdfTree) -> Any:
+    """Collision shapes of a file, meshes as convex hulls; kept, because hulls take seconds and are asked for often."""
+    import pinocchio
+
+    shapes = pinocchio.buildGeomFromUrdfString(tree.model, tree.xml, pinocchio.GeometryType.COLLISION)
     _join_capsules(shapes)
     for shape in shapes.geometryObjects:
         _convex(shape)
-    reduced, kept = pinocchio.buildReducedModel(model, shapes, locked, configuration)
-    return reduced, kept
+    return shapes
 
 
 def _join_capsules(shapes: Any) -> None:
@@ -311,16 +321,42 @@ def _join_capsules(shapes: Any) -> None:
 def _convex(shape: Any) -> None:
     """Replaces a mesh by its convex hull, which is faster to check and never smaller."""
     if hasattr(shape.geometry, "buildConvexHull"):
-        shape.geometry.buildConvexHull(True, "Qt")
+        try:
+            small = _hull(shape.geometry)
+            if small is not None:
+                shape.geometry = small
+                return
+            shape.geometry.buildConvexHull(True, "Qt")
+        except RuntimeError:  # a mesh that has no volume stays as it is
+            return
         if shape.geometry.convex is not None:
             shape.geometry = shape.geometry.convex
+
+
+def _hull(mesh: Any) -> Any:
+    """The convex hull of a large mesh, from its corners alone, which is faster; ``None`` if that cannot be had."""
+    import coal
+    from scipy.spatial import ConvexHull, QhullError
+
+    points = np.array(mesh.vertices(), dtype=np.float64).reshape(-1, 3)
+    if len(points) < _LARGE:
+        return None
+    try:
+        corners = points[ConvexHull(points).vertices]
+    except QhullError:
+        return None
+    vertices = coal.StdVec_Vec3s()
+    for corner in corners:
+        vertices.append(corner)
+    return coal.ConvexBase.convexHull(vertices, True, "Qt")
 
 
 def _indices(model: Any, robot: Robot) -> tuple[list[int], list[tuple[int, int]]]:
     """Where each arm joint's angle goes in pinocchio's configuration, and which joints are continuous."""
     index, turns = [], []
+    names = read_urdf(robot.urdf).model_joints
     for column, name in enumerate(robot.joint_names):
-        joint = model.joints[model.getJointId(name)]
+        joint = model.joints[model.getJointId(names[name])]
         index.append(joint.idx_q)
         if joint.nq == 2:
             turns.append((column, joint.idx_q))

@@ -12,11 +12,11 @@ from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MotionError, OptionError, TeleoperationError, nearest_name
+from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.motions.clip import MotionClip, Motions, Take
 from syda_gym.motions.loading import load_motions
 from syda_gym.motions.pairing.alignment import Alignment, pair_quality, pair_recordings
 from syda_gym.motions.pairing.recorded_session import Session
-from syda_gym.routes.choice import geometric_mapping
 from syda_gym.teleoperation.calibration import Calibration, Calibrator
 from syda_gym.teleoperation.incoming.frame_clock import FrameClock
 from syda_gym.teleoperation.incoming.sources import Source
@@ -278,7 +278,7 @@ def _robot_clips(data: Motions, robot: str) -> list[MotionClip]:
     others = [name for name, body in data.bodies.items() if isinstance(body, Robot)]
     if not others:
         raise MotionError(f"{data.name} holds no robot's motions to take prompts from; name others with --motions")
-    carry = geometric_mapping(data.bodies[others[0]], follower)
+    carry = unfitted(data.bodies[others[0]], follower)
     return [
         MotionClip(follower, carry.sequence(clip.frames, clip.fps), clip.fps, clip.action, clip.recording)
         for clip in data.clips(others[0])

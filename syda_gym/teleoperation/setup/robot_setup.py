@@ -8,17 +8,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from syda_gym.embodiments import catalog
-from syda_gym.embodiments.discovery.arms import discover
-from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.discovery.arms import search
+from syda_gym.embodiments.kinematics.urdf import read_urdf
 from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.embodiments.robot import Robot, RobotDescription
 from syda_gym.errors import EmbodimentError, OptionError
 from syda_gym.files import write_text
+from syda_gym.simulation.plain_body import weak_joints
 from syda_gym.teleoperation.safety.self_collision import SelfCollision
 from syda_gym.teleoperation.setup.robot_picture import draw_robot
+from syda_gym.teleoperation.setup.robot_yaml import robot_yaml
+from syda_gym.teleoperation.setup.verdict import Verdict, judge_robot
 
 __all__ = ["AddedRobot", "add_robot", "describe_robot"]
 
@@ -34,15 +36,20 @@ class AddedRobot:
         robot: ready for use.
         description: the YAML that was written.
         picture: the PNG beside it.
-        pointing_error: mean angle [rad] between the limbs of random reachable operator poses and the robot's.
+        verdict: how far its limbs can point as a person's do.
         notices: what a person should check.
     """
 
     robot: Robot
     description: Path
     picture: Path
-    pointing_error: float
+    verdict: Verdict
     notices: tuple[str, ...]
+
+    @property
+    def pointing_error(self) -> float:
+        """Mean angle between the limbs of a person's poses and the robot's [rad]."""
+        return self.verdict.error
 
 
 def add_robot(
@@ -59,7 +66,8 @@ def add_robot(
     The YAML goes to ``catalog.user_folder()`` and is meant to be edited; it points to the URDF where it lies.
 
     Args:
-        urdf: any URDF, with primitives or meshes; meshes need not be there.
+        urdf: any URDF, with primitives or meshes, which need not be there; a xacro or an MJCF where the extra for it is
+            installed; or a description (``.yaml``) written by hand, whose points and joints are taken as they are.
         name: the new name, lower case; by default the file's.
         left: link at the end of the left arm, where the search finds the wrong one.
         right: link at the end of the right arm.
@@ -86,10 +94,13 @@ def add_robot(
         )
     description, notices = describe_robot(urdf, chosen, left=left, right=right, torso=torso)
     robot = Robot(description)
-    picture = draw_robot(robot, path.with_suffix(".png"))  # first: a robot that cannot be drawn is not added
-    write_text(path, _yaml(robot))
+    verdict = judge_robot(robot)
+    title = f"points its limbs within {np.degrees(verdict.error):.1f} degrees of a person's: {verdict.word}"
+    # The picture first: a robot that cannot be drawn is not added.
+    picture = draw_robot(robot, path.with_suffix(".png"), title=title)
+    write_text(path, robot_yaml(description))
     catalog.register(chosen, Robot.read(path), replace=True)
-    return AddedRobot(robot, path, picture, _pointing_error(robot), tuple(notices))
+    return AddedRobot(robot, path, picture, verdict, tuple(notices))
 
 
 def describe_robot(
@@ -105,25 +116,50 @@ def describe_robot(
     Raises:
         EmbodimentError: as ``add_robot``.
     """
-    found = discover(urdf, name=name, left=left, right=right, torso=torso)
-    notices = []
+    found, notices = _found(urdf, name, left, right, torso)
     if len(found.arms) == 1:
         notices.append(f"only a {found.arms[0].side} arm was found; name the other one with --left or --right")
-    rest = _hanging(Robot(found))
-    described = replace(found, rest=rest)
+    described = found if found.rest else replace(found, rest=_hanging(Robot(found)))
     robot = Robot(described)
+    tree = read_urdf(described.urdf)
+    missing = sum(shape.missing for shapes in tree.shapes.values() for shape in shapes)
+    if missing:
+        notices.append(f"{missing} meshes that the file names are not there; what shows nothing is drawn as sticks")
     check = SelfCollision(robot)
     if check.why:
         notices.append(check.why)
     elif check.ignored:
-        described = replace(described, disabled_collisions=check.ignored)
+        pairs = tuple(dict.fromkeys([*described.disabled_collisions, *check.ignored]))
+        described = replace(described, disabled_collisions=pairs)
         notices.append(
             f"{len(check.ignored)} pairs of links overlap by construction or at rest; their contact is ignored"
         )
     unknown = [n for n, speed in zip(robot.joint_names, robot.speed, strict=True) if not np.isfinite(speed)]
     if unknown:
         notices.append(f"the URDF names no speed limit for {', '.join(unknown)}; live commands keep to 2 rad/s")
+    weak = weak_joints(robot)
+    if weak:
+        told = ", ".join(f"{joint} ({needed:.1f} of {effort:.1f} N m)" for joint, needed, effort in weak)
+        notices.append(f"stretched forward, gravity asks more of these motors than the URDF's effort: {told}")
     return described, notices
+
+
+def _found(
+    urdf: str | os.PathLike[str], name: str, left: str | None, right: str | None, torso: str | None
+) -> tuple[RobotDescription, list[str]]:
+    """What was found in a file, or a description that somebody wrote, and notes about it."""
+    if Path(urdf).suffix.lower() in (".yaml", ".yml"):
+        if (left, right, torso) != (None, None, None):
+            raise OptionError("a description names its arms itself; drop --left, --right and --torso, or name a URDF")
+        return replace(Robot.read(urdf).description, name=name), []
+    found = search(urdf, name=name, left=left, right=right, torso=torso)
+    notes = list(found.notes)
+    if found.left_out:
+        told = ", ".join(found.left_out[:8]) + (
+            f" and {len(found.left_out) - 8} more" if len(found.left_out) > 8 else ""
+        )
+        notes.append(f"joints on the arms that are not moved: {told}")
+    return found.description, notes
 
 
 def _hanging(robot: Robot) -> dict[str, float]:
@@ -135,73 +171,6 @@ def _hanging(robot: Robot) -> dict[str, float]:
         wanted = np.array([[[[0.1, spread * side, -1.0], [0.5, spread * side, -1.0]] for side in sides]])
         angles = solver.solve(wanted)[0]
         candidate = Robot(replace(robot.description, rest=dict(zip(robot.joint_names, angles.tolist(), strict=True))))
-        if not SelfCollision(candidate, margin=0.0).ignores_far_links():
+        if not SelfCollision(candidate, margin=0.0, samples=16).ignores_far_links():
             break
     return {name: round(float(angle), 4) for name, angle in zip(robot.joint_names, angles, strict=True)}
-
-
-def _pointing_error(robot: Robot) -> float:
-    """How well the robot can point its limbs as a human does: mean angle over poses in front and beside the body."""
-    rng = np.random.default_rng(0)
-    directions = rng.normal(size=(200, len(robot.sides), 2, 3))
-    directions[..., 0] = np.abs(directions[..., 0])
-    for index, side in enumerate(robot.sides):
-        outward = 1.0 if side == "left" else -1.0
-        directions[:, index, 0, 1] = outward * np.abs(directions[:, index, 0, 1])
-    reached = np.diff(robot.arm_points(LimbIK(robot).solve(directions)), axis=2)
-    cosine = np.sum(_unit(reached) * _unit(directions), axis=-1)
-    return float(np.arccos(np.clip(cosine, -1.0, 1.0)).mean())
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    unit: FloatArray = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
-    return unit
-
-
-def _yaml(robot: Robot) -> str:
-    description = robot.description
-    parts: list[tuple[str, dict[str, object]]] = [
-        (f"# Found by `syda-gym robot add`; edit what is wrong, then look again: syda-gym robot show {robot.name}\n"
-         "# Lengths in metres, angles in radians.",
-         {"name": description.name, "urdf": str(description.urdf)}),
-        ("# The link in whose frame landmarks are expressed (x forward, y left, z up after `axes`).",
-         {"torso": description.torso, "height": round(description.height, 3)}),
-    ]  # fmt: skip
-    if description.axes is not None:
-        parts.append(
-            (
-                "# Rows: forward, left and up of the body, in the torso link's own frame.",
-                {"axes": [list(row) for row in description.axes]},
-            )
-        )
-    arms = [
-        {
-            "side": arm.side,
-            "joints": list(arm.joints),
-            "shoulder": arm.shoulder,
-            "elbow": arm.elbow,
-            "wrist": arm.wrist,
-            "tip": arm.tip,
-        }
-        for arm in description.arms
-    ]
-    parts.append(("# Links whose origins are shoulder, elbow, wrist and the end of the arm.", {"arms": arms}))
-    parts.append(("# The pose to start from and to return to.", {"rest": dict(description.rest)}))
-    if description.disabled_collisions:
-        parts.append(
-            (
-                "# Pairs of links whose contact is ignored: they overlap by construction or at rest.",
-                {"disabled_collisions": [list(pair) for pair in description.disabled_collisions]},
-            )
-        )
-    return "".join(f"{comment}\n{_dumped(value)}" for comment, value in parts)
-
-
-def _dumped(value: dict[str, object]) -> str:
-    """One key a line, small lists and tables within the line."""
-    return "".join(
-        yaml.safe_dump(
-            {key: one}, sort_keys=False, width=110, default_flow_style=None if isinstance(one, list | dict) else False
-        )
-        for key, one in value.items()
-    )

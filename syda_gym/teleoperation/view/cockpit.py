@@ -20,7 +20,7 @@ from syda_gym.look import OPERATOR, REFERENCE, ROBOT, rgba
 from syda_gym.motions.film.landmarks import BONES_SEEN
 from syda_gym.simulation.page.plan import BodyPlan, Button, PagePlan, PlotPlan, body_plan
 from syda_gym.simulation.page.process import PageProcess
-from syda_gym.simulation.pictures.camera import OPERATOR_AT
+from syda_gym.simulation.pictures.stage import OPERATOR_AT
 from syda_gym.teleoperation.incoming.camera import PictureSource
 from syda_gym.teleoperation.incoming.sources import Source, require_token
 from syda_gym.teleoperation.live_statistics import LiveStatistics

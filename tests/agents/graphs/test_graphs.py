@@ -17,7 +17,8 @@ from syda_gym.mappings.storage import load_mapping
 from syda_gym.motions.synthetic.generator import generate
 
 KINDS = {
-    "general": ("syda", "general", {"epochs": 2, "confidence": False}),
+    "general": ("syda", "general", {"confidence": False}),
+    "synergies": ("syda", "synergies", {"epochs": 2, "confidence": False}),
     "accurate": ("syda", "accurate", {"confidence": False}),
     "interpolation": ("syda", "interpolation", {"epochs": 2, "confidence": False}),
     "paper": ("syda", "paper", {"epochs": 2}),

@@ -24,7 +24,7 @@ def test_baselines_map_their_training_frames(adult_pepper, tmp_path, method):
 
 @pytest.mark.parametrize("method", sorted(METHODS))
 def test_each_method_inverts_or_says_that_it_cannot(adult_pepper, method):
-    options = {"epochs": 1} if method in ("syda", "direct") else {}
+    options = {"epochs": 1} if method == "direct" else {}
     if method == "mink":
         pytest.importorskip("mink")
     mapping = fit(adult_pepper.rows(np.arange(0, 120, 6)), method, confidence=False, **options)

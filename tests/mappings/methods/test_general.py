@@ -16,7 +16,7 @@ from tests.mappings.conftest import make_pair
 
 @pytest.fixture(scope="module")
 def mapping(adult_pepper: PairedMotions) -> CodedMapping:
-    return fit(adult_pepper, epochs=40)
+    return fit(adult_pepper, preset="synergies", epochs=40)
 
 
 def moved(body: HumanSkeleton, frames: np.ndarray, scale: float, turn: float, shift: list[float]) -> np.ndarray:
@@ -68,9 +68,9 @@ def test_unseen_actions_are_predicted_better_than_by_the_mean_pose(adult_pepper)
     assert error < 0.6 * spread(test)
 
 
-@pytest.mark.parametrize("preset", ["general", "accurate", "interpolation"])
+@pytest.mark.parametrize("preset", ["general", "synergies", "accurate", "interpolation"])
 def test_every_preset_comes_back_from_disk_bit_by_bit(adult_pepper, tmp_path, preset):
-    options = {} if preset == "accurate" else {"epochs": 2}
+    options = {} if preset in ("general", "accurate") else {"epochs": 2}
     mapping = fit(adult_pepper, preset=preset, **options)
     save_mapping(mapping, tmp_path / "m")
     loaded = load_mapping(tmp_path / "m")
@@ -183,13 +183,17 @@ def test_options_are_checked(adult_pepper):
     with pytest.raises(OptionError, match="lag"):
         fit(adult_pepper, lag=-2)
     with pytest.raises(OptionError, match="did you mean 'noise'"):
-        fit(adult_pepper, nois=0.1)
+        fit(adult_pepper, preset="synergies", nois=0.1)
+    with pytest.raises(OptionError, match="did you mean 'shrinkage'"):
+        fit(adult_pepper, shrinkag=0.1)
     with pytest.raises(MappingError, match="confidence=True"):
-        fit(adult_pepper, epochs=1, confidence=False).error_bound(adult_pepper.source)
+        fit(adult_pepper, confidence=False).error_bound(adult_pepper.source)
 
 
 def test_one_action_gives_no_bound_and_says_why(adult_pepper):
-    mapping = fit(adult_pepper.only_actions(["reach0"]), epochs=2)
+    mapping = fit(adult_pepper.only_actions(["reach0"]))
     with pytest.raises(MappingError, match="two actions"):
         mapping.error_bound(adult_pepper.source)
+    assert "no error bound: one action" in repr(mapping)
     assert mapping.difficulty(adult_pepper.source).shape == (len(adult_pepper),)
+    assert not mapping.unfamiliar(adult_pepper.source).any(), "one action cannot tell how far another one may be"

@@ -78,5 +78,5 @@ def test_fits_with_different_choices_keep_their_order(adult_pepper):
 
 def test_a_given_noise_is_not_chosen_again(adult_pepper):
     given = fit(adult_pepper, preset="nested", noise=0.3, epochs=3, confidence=False)
-    fixed = fit(adult_pepper, epochs=3, confidence=False)
+    fixed = fit(adult_pepper, preset="synergies", epochs=3, confidence=False)
     assert np.array_equal(given(adult_pepper.source), fixed(adult_pepper.source))

@@ -42,7 +42,7 @@ def test_several_clips_are_mapped_one_by_one(looking_back, adult_pepper):
 
 
 def test_frame_by_frame_gives_what_the_clip_gives(looking_back, adult_kid, adult_pepper):
-    from_kid = fit(kid_led(adult_pepper, adult_kid), window=2, epochs=5, confidence=False)
+    from_kid = fit(kid_led(adult_pepper, adult_kid), window=2, confidence=False)
     chain = fit(adult_kid, confidence=False) >> from_kid
     clip = adult_pepper.only_actions(["reach2"]).source
     for mapping in (looking_back, chain):
@@ -71,8 +71,7 @@ def kid_led(adult_pepper: PairedMotions, adult_kid: PairedMotions) -> PairedMoti
 
 @pytest.mark.parametrize("method", ["syda", "ridge"])
 def test_a_window_comes_back_from_disk(method, adult_pepper, tmp_path):
-    options = {"epochs": 2} if method == "syda" else {}
-    mapping = fit(adult_pepper, method, window=3, **options)
+    mapping = fit(adult_pepper, method, window=3)
     save_mapping(mapping, tmp_path / "m")
     loaded = load_mapping(tmp_path / "m")
     assert loaded.window == 3
@@ -85,7 +84,7 @@ def test_the_inverse_of_a_window_maps_single_frames(looking_back, adult_pepper):
     assert np.allclose(back(adult_pepper.target[7]), back(adult_pepper.target[7:9])[0])
 
 
-@pytest.mark.parametrize("preset", ["accurate", "interpolation", "nested"])
+@pytest.mark.parametrize("preset", ["synergies", "accurate", "interpolation", "nested"])
 def test_other_presets_take_a_window(preset, adult_pepper):
     options = {} if preset == "accurate" else {"epochs": 2}
     mapping = fit(adult_pepper, preset=preset, window=1, confidence=False, **options)
