@@ -126,7 +126,7 @@ def route(
     if predictor in (None, "dry_run") and kind in (None, "dry_run") and not noise:
         options |= _plan_of(motions, sensor)
     if predictor == "measured":
-        from syda_gym.evaluation.prediction.study import measure_bodies
+        from syda_gym.routes.measured import measure_bodies
 
         named = [(getattr(a, "name", a), getattr(b, "name", b)) for a, b in fitted]
         with stages({"fit": "Fitting pairs to measure bodies"}) as tell:

@@ -145,9 +145,7 @@ def recorded_angles(robot: Robot, meant: Sequence[FloatArray], seed: int) -> lis
     return [robot.clamp(angles[k, : len(clip)]) for k, clip in enumerate(meant)]
 
 
-def _led(
-    robot: Robot, arm: int, goal: FloatArray, weights: FloatArray, pull: float, gain: float
-) -> FloatArray:
+def _led(robot: Robot, arm: int, goal: FloatArray, weights: FloatArray, pull: float, gain: float) -> FloatArray:
     """Angles ``(K, T, n)`` of one arm whose elbow and wrist are led to ``goal`` ``(K, T, 2, 3)`` [arm lengths]."""
     chain, part = robot.chains[arm], robot.arm_slices[arm]
     length, rest = float(robot.arm_lengths[arm].sum()), robot.rest[part]

@@ -18,13 +18,14 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, SydaError, nearest_name
 from syda_gym.evaluation.pools import Tell
 from syda_gym.evaluation.prediction.bed import TestBed, recorded_angles
-from syda_gym.evaluation.prediction.trial import BedFrames, fit_all, fit_options, held_out_errors
+from syda_gym.evaluation.prediction.trial import BedFrames, fit_all, held_out_errors
 from syda_gym.files import fingerprint
 from syda_gym.motions.loading import load_motions
-from syda_gym.routes.dry_run.imitation import SIDES, Retargeter, track
-from syda_gym.routes.dry_run.memory import default_plan, imitation_key
+from syda_gym.routes.dry_run.imitation import Retargeter, track
+from syda_gym.routes.dry_run.memory import default_plan
 from syda_gym.routes.dry_run.plan import Plan
 from syda_gym.routes.dry_run.rehearsal import DEPTH_CAMERA, Rehearsal
+from syda_gym.routes.measured import fit_options
 from syda_gym.routes.metric import Transferability, transferability
 
 __all__ = ["DRY_RUNS", "BedJob", "BedSettings", "bed_routes", "open_bed"]
@@ -58,10 +59,19 @@ class BedSettings:
 
     def key(self, job: BedJob) -> str:
         """Everything that decides what a job gives."""
-        bodies = [json.dumps(body.spec(), sort_keys=True, default=str) for body in self.bed.bodies.values()]
-        exact = [imitation_key(body, self.bed.plan.clips[0]) for body in self.bed.bodies.values()]
+        bodies = [_mark(body) for body in self.bed.bodies.values()]
         numbers = (self.folds, self.fps, self.max_hops, self.method, self.preset, self.seed)
-        return fingerprint("bed", _FORMAT, *bodies, *exact, self.bed.plan.fingerprint, repr(numbers), repr(job))
+        return fingerprint("bed", _FORMAT, *bodies, self.bed.plan.fingerprint, repr(numbers), repr(job))
+
+
+def _mark(body: Embodiment) -> str:
+    """Everything of a body that counts; where its files lie does not."""
+    if not isinstance(body, Robot):
+        return json.dumps(body.spec(), sort_keys=True, default=str)
+    arrays = [body.lower, body.upper, body.speed, body.rest]
+    for chain in body.chains:
+        arrays += [chain.rotations, chain.offsets, chain.axes, chain.point_offsets]
+    return fingerprint(body.name, *(array.tobytes() for array in arrays))
 
 
 @dataclass(frozen=True)
@@ -195,7 +205,7 @@ def by_limb_ik(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
     from syda_gym.mappings.limits import limit_speed
     from syda_gym.routes.dry_run.plan import FPS
 
-    clips, count = wanted.shape[:2]
+    clips = len(wanted)
     both = np.repeat(wanted[:, :, None], len(robot.sides), axis=2)
     part = robot.arm_slices[index]
     reached = np.empty_like(wanted)

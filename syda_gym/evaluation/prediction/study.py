@@ -7,39 +7,25 @@ length, on the arms that both its ends have.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from itertools import permutations
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from syda_gym.embodiments.embodiment import Embodiment, FloatArray
-from syda_gym.errors import MotionError, OptionError
+from syda_gym.embodiments.embodiment import Embodiment
+from syda_gym.errors import OptionError
 from syda_gym.evaluation.prediction.results import PredictionStudy, RouteResult
 from syda_gym.evaluation.prediction.scores import score_predictors
-from syda_gym.evaluation.prediction.trial import (
-    MOST_TRAINING_FRAMES,
-    BedFrames,
-    Progress,
-    fit_all,
-    fit_options,
-    held_out_errors,
-    landmark_gap,
-)
-from syda_gym.mappings.fitting.fit import fit_many
-from syda_gym.mappings.mapping import Mapping
+from syda_gym.evaluation.prediction.trial import BedFrames, Progress, fit_all, held_out_errors
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
-from syda_gym.routes.measured import MeasuredBodies, measured_bodies
+from syda_gym.routes.measured import fit_options, measured_bodies
 from syda_gym.routes.metric import Transferability, transferability
 from syda_gym.routes.noise import alpha_from_noise, high_frequency_noise
 
-__all__ = ["measure_bodies", "motion_noise", "validate"]
+__all__ = ["motion_noise", "validate"]
 
 Names = tuple[str, ...]
-
 
 
 def validate(
@@ -106,47 +92,6 @@ def validate(
         scores=score_predictors(routes, seed=seed, resamples=resamples),
         full_scores=score_predictors(complete, seed=seed, resamples=resamples) if partial else (),
     )
-
-
-def measure_bodies(
-    motions: str | Motions,
-    pairs: Sequence[tuple[str, str]] | None = None,
-    *,
-    method: str = "syda",
-    preset: str | None = None,
-    fps: float = 5.0,
-    seed: int = 0,
-    progress: Progress | None = None,
-) -> MeasuredBodies:
-    """Fits pairs and turns their training errors into a predictor for routing.
-
-    Args:
-        motions: recordings.
-        pairs: which to fit; all that were recorded together by default.
-        method: how pairs are fitted.
-        preset: of the method.
-        fps: frames per second that are kept.
-        seed: of the fits.
-        progress: told the stage (``fit``) and its finished fraction.
-
-    Returns:
-        Pass it as ``predictor`` to ``best_route``, or ask its ``error(route)``.
-    """
-    recorded = load_motions(load_motions(motions), fps=fps)
-    chosen = list(pairs or recorded.pairs)
-    errors: dict[tuple[str, str], float] = {}
-    for done, (a, b) in enumerate(chosen):
-        if recorded.bodies[a].kind > recorded.bodies[b].kind:
-            a, b = b, a  # human to robot is the fitted direction
-        pair = recorded.pair(a, b)
-        (model,) = fit_many([pair], method, preset, [seed], **fit_options(preset, fps))
-        rows = np.arange(len(pair))[:: max(1, len(pair) // MOST_TRAINING_FRAMES)]
-        for link, given, wanted in ((model, pair.source, pair.target), (model.inverse(), pair.target, pair.source)):
-            gap = landmark_gap(link.source, link.target, link(given[rows]), wanted[rows])
-            errors[link.source.name, link.target.name] = gap / link.target.reach
-        if progress:
-            progress("fit", (done + 1) / len(chosen))
-    return measured_bodies(errors)
 
 
 def motion_noise(motions: Motions, names: Sequence[str] | None = None) -> dict[str, float]:

@@ -14,15 +14,14 @@ from syda_gym.errors import MotionError
 from syda_gym.mappings.fitting.fit import fit_many
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.motions.clip import Motions
+from syda_gym.routes.measured import MOST_TRAINING_FRAMES, landmark_gap
 
-__all__ = ["MOST_TRAINING_FRAMES", "BedFrames", "Progress", "fit_all", "fit_options", "held_out_errors", "landmark_gap"]
+__all__ = ["BedFrames", "Progress", "fit_all", "held_out_errors"]
 
 Progress = Callable[[str, float], None]
 Names = tuple[str, ...]
 
-LAG_SECONDS = 0.2
 MOST_TEST_FRAMES = 120
-MOST_TRAINING_FRAMES = 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +35,11 @@ class BedFrames:
 
     @classmethod
     def of(cls, motions: Motions, names: Names) -> BedFrames:
+        """The takes in which all the named bodies move together.
+
+        Raises:
+            MotionError: fewer than three bodies or two actions together.
+        """
         missing = [name for name in names if name not in motions.bodies]
         takes = [take for take in motions.takes if all(name in take.frames for name in names)]
         if missing or len(names) < 3 or len({take.action for take in takes}) < 2:
@@ -50,6 +54,7 @@ class BedFrames:
 
     @property
     def distinct(self) -> NDArray[np.str_]:
+        """The actions."""
         return np.unique(self.actions)
 
     def rows(self, held: NDArray[np.str_], test: bool) -> NDArray[np.intp]:
@@ -124,16 +129,3 @@ def _error(table: BedFrames, route: Names, mapped: FloatArray, rows: NDArray[np.
     """Mean distance of elbows and wrists [m] on the arms that both ends have."""
     wanted = table.frames[route[-1]][rows]
     return landmark_gap(table.bodies[route[0]], table.bodies[route[-1]], mapped, wanted)
-
-
-def landmark_gap(source: Embodiment, target: Embodiment, mapped: FloatArray, wanted: FloatArray) -> float:
-    arms = [i for i, side in enumerate(target.sides) if side in source.sides] or list(range(len(target.sides)))
-    gap = target.arm_points(mapped)[:, arms, 1:] - target.arm_points(wanted)[:, arms, 1:]
-    return float(np.linalg.norm(gap, axis=-1).mean())
-
-
-def fit_options(preset: str | None, fps: float) -> dict[str, Any]:
-    """No error bound, and a lag of the same time at any frame rate."""
-    return {} if preset == "paper" else {"lag": max(1, round(LAG_SECONDS * fps)), "confidence": False}
-
-

@@ -109,8 +109,10 @@ class Performer:
         self.style = _style(body, self._rng("style"))
 
     def directions(self, score: Performable, label: str, fps: float) -> FloatArray:
-        """Limb directions ``(N, arms, 2, 3)`` that this body means to show, its habits included; arguments as
-        ``perform``. A robot may not reach them."""
+        """Limb directions ``(N, arms, 2, 3)`` that this body means to show, its habits included.
+
+        Arguments as ``perform``. A robot may not reach them.
+        """
         return self._directions(score, fps, self._rng("take", label))
 
     def _rng(self, *labels: str | int) -> np.random.Generator:
