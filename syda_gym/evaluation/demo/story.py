@@ -29,7 +29,8 @@ def question(result: DemoResult) -> Text:
     return Text(
         f"A new operator, {cast.operator}, has never been recorded with {cast.robot}. One session with one of "
         f"{len(cast.between)} bodies that have been, would do: {', '.join(cast.between)}. With whom? Asked before "
-        "anything is fitted: every body imitates the operator's planned motion on paper, within its joint limits and speeds."
+        "anything is fitted: every body imitates the operator's planned motion on paper, within its joint limits and "
+        "speeds."
     )
 
 

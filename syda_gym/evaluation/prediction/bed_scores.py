@@ -128,8 +128,8 @@ class _Table:
         choices = np.array([[score(p[g], e[g]) for g in chosen] for p, e in zip(predicted, self.errors, strict=True)])
         lost = np.array([[_regret(p[g], e[g]) for g in chosen] for p, e in zip(predicted, self.errors, strict=True)])
         for name, values in (("choice", choices.mean(axis=0)), ("regret", lost.mean(axis=0))):
-            found[name] = _interval(float(np.nanmean(values)), [float(np.nanmean(values[draw])) for draw in draws])
-        found["regret_average"] = float(np.nanmean([_regret(mean[g], average[g]) for g in chosen]))
+            found[name] = _interval(_known_mean(values), [_known_mean(values[draw]) for draw in draws])
+        found["regret_average"] = _known_mean([_regret(mean[g], average[g]) for g in chosen])
         return found
 
     def ceiling(self) -> dict[str, float]:
@@ -141,19 +141,18 @@ class _Table:
         for what, rows in (("pairs", self.hops == 1), ("chains", self.hops > 1)):
             agreement = float(np.mean([score(-self.errors[i, rows], self.errors[j, rows]) for i, j in couples]))
             found |= _ceilings(what, agreement, count)
-        agreement = float(
-            np.nanmean([score(-self.errors[i, g], self.errors[j, g]) for i, j in couples for g in chosen if len(g) > 2])
-        )
+        choices = [score(-self.errors[i, g], self.errors[j, g]) for i, j in couples for g in chosen]
+        agreement = _known_mean(choices)
         found |= _ceilings("choice", agreement, count)
         both = [(i, j) for i in range(count) for j in range(count) if i != j]
         regrets = [_regret(-self.errors[i, g], self.errors[j, g]) for i, j in both for g in chosen]
-        found["oracle_regret"] = float(np.nanmean(regrets))
+        found["oracle_regret"] = _known_mean(regrets)
         return found
 
     def random_regret(self) -> float:
         """Excess error of a chain drawn by chance over the best one of the same ends."""
         chosen = [group[self.hops[group] > 1] for group in self.groups]
-        return float(np.nanmean([e[g].mean() / e[g].min() - 1.0 for e in self.errors for g in chosen if len(g) > 1]))
+        return _known_mean([e[g].mean() / e[g].min() - 1.0 for e in self.errors for g in chosen if len(g) > 1])
 
     def leave_one_out(self, predictions: Mapping[str, FloatArray], names: Names) -> dict[str, Any]:
         """Scores without any one body: body to pairs and chains."""
@@ -182,13 +181,20 @@ def _ceilings(what: str, agreement: float, count: int) -> dict[str, float]:
     }
 
 
+def _known_mean(values: Any) -> float:
+    """Mean of what is known; not a number where nothing is."""
+    finite = np.asarray(values)[np.isfinite(values)]
+    return float(finite.mean()) if len(finite) else float("nan")
+
+
 def _drawn(parts: Sequence[NDArray[np.intp]], draw: NDArray[np.intp]) -> NDArray[np.intp]:
     return np.concatenate([parts[end] for end in draw])
 
 
 def _interval(value: float, drawn: Sequence[float]) -> dict[str, float]:
     tail = 50.0 * (1.0 - CONFIDENCE)
-    low, high = np.nanpercentile(drawn, [tail, 100.0 - tail])
+    finite = [one for one in drawn if np.isfinite(one)] or [float("nan")]
+    low, high = np.percentile(finite, [tail, 100.0 - tail])
     return {"value": value, "low": float(low), "high": float(high)}
 
 
