@@ -26,7 +26,7 @@ lowest: $(BASE)
 	$(PYTHON) -m venv --clear $(LOWEST)
 	$(LOWEST)/bin/python -m pip install --quiet uv "torch==2.13.0"
 	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct \
-		-e ".[dev,train,ik,bvh,live,camera,view,export]"
+		-e ".[dev,train,ik,live,camera,view,export]"
 	$(LOWEST)/bin/python -m pytest -p no:cacheprovider tests/embodiments tests/motions tests/mappings tests/simulation \
 		tests/envs tests/teleoperation tests/agents tests/cli
 
@@ -56,7 +56,7 @@ $(BASE): pyproject.toml
 
 # Everything that tests, checks and documentation need; extras left out here are tested where they are installed.
 $(DEVELOPMENT): $(BASE)
-	$(BIN)/python -m pip install --quiet -e ".[dev,docs,train,ik,bvh,live,camera,view,naoqi,export]"
+	$(BIN)/python -m pip install --quiet -e ".[dev,docs,train,ik,live,camera,view,naoqi,export,c3d,ros,mjcf,xacro,robots]"
 	touch $@
 
 clean:

@@ -225,11 +225,12 @@ def teleop(
         report = decide_anew(replay_journal, chosen)
         where = "" if report.exact else f"; the first other one is in line {report.first_difference}"
         say.print(f"{report.same} of {report.ticks} decisions are the same, bit for bit{where}")
-        raise typer.Exit(code=0 if report.exact else 1)
+        if report.damage:
+            say.print(f"[red]the journal is not whole[/]: {report.damage}")
+        raise typer.Exit(code=0 if report.exact and not report.damage else 1)
     settings = LoopSettings(
         rate=rate, calibration=calibration, axes=axes, speed=limit, bound_slow=bound_slow, bound_hold=bound_hold
     )
-    _end_gently()
     secret = read_token(token_file)
     with _Screen(view_address if view else "", secret, appearance) as screen:
         stats = teleoperate(
@@ -376,16 +377,10 @@ class _Screen:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stack.close()
+        from contextlib import suppress
 
-
-def _end_gently() -> None:
-    """Makes a termination signal end the run as Ctrl-C does, with the robot going to rest."""
-    import signal
-    import threading
-
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        with suppress(OSError):  # the terminal was closed; the robot is home all the same
+            self._stack.close()
 
 
 def _print_robot(robot: Robot) -> None:

@@ -99,7 +99,7 @@ PHYSICS = ("bullet", "servo")
 REFERENCES = ("paired", "mapped")
 """What errors are measured against."""
 
-AXES = ("kinect", "ros", "camera")
+AXES = ("kinect", "ros", "camera", "unity")
 """Axes of a live source."""
 
 SOURCES = ("camera[:N]", "film:FILE.mp4", "replay:SPEC", "udp:PORT", "udp:HOST:PORT", "ws:PORT")

@@ -113,7 +113,7 @@ def _show(
 ) -> None:
     from syda_gym.simulation.page.showing import show
     from syda_gym.teleoperation.addresses import host_and_port
-    from syda_gym.teleoperation.incoming.sources import require_token
+    from syda_gym.teleoperation.incoming.network import require_token
 
     host, port = host_and_port(address, 8099)
     require_token(host, None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -84,6 +85,27 @@ class ChainMapping(Mapping):
         for link in self.links[:-1]:
             frames = link(frames)
         return self.links[-1].raw(frames)
+
+    def begin(self) -> tuple[Any, ...]:
+        """What each link remembers."""
+        return tuple(link.begin() for link in self.links)
+
+    def follow(
+        self, frames: ArrayLike, memory: Any, dt: float | None = None, *, limited: bool = True, skip: int = 0
+    ) -> tuple[FloatArray, Any]:
+        """Each link follows the one before it; see ``Mapping.follow``.
+
+        Raises:
+            MappingError: ``skip`` for links that remember; a ``stream.FrameStream`` looks back link by link.
+        """
+        if skip:
+            raise MappingError("a chain cannot skip frames; use syda_gym.mappings.stream.FrameStream")
+        current: FloatArray = np.atleast_2d(np.asarray(frames, dtype=np.float64))
+        memories = []
+        for link, remembered in zip(self.links, memory, strict=True):
+            current, after = link.follow(current, remembered, dt, limited=limited)
+            memories.append(after)
+        return current, tuple(memories)
 
     def inverse(self) -> ChainMapping:
         """The inverses of the links, in reverse order.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -66,6 +66,25 @@ class CodedMapping(Mapping):
     def raw(self, frames: FloatArray) -> FloatArray:
         """Encodes, regresses, decodes; joint limits are not enforced."""
         return self.target_coder.decode(self.regressor(self.source_coder.encode(frames)))
+
+    def begin(self) -> Any:
+        """What the target's coder remembers."""
+        return self.target_coder.begin()
+
+    def follow(
+        self, frames: ArrayLike, memory: Any, dt: float | None = None, *, limited: bool = True, skip: int = 0
+    ) -> tuple[FloatArray, Any]:
+        """Encodes and regresses each frame, and decodes them in time order; see ``Mapping.follow``."""
+        array = np.atleast_2d(np.asarray(frames, dtype=np.float64))
+        if len(array) == 1 and self._single is not None:
+            found = self._single.follow(array[0], memory, dt, limited)
+            if found is not None:
+                return found[0][None], found[1]
+        codes = self.regressor(self.source_coder.encode(self.source.check(array)))[skip:]
+        if not np.isfinite(codes).all():
+            raise MappingError(f"{self!r} gave values that are not finite; fit it again on more varied frames")
+        mapped, memory = self.target_coder.follow(codes, memory, dt, limited)
+        return self._within_limits(mapped), memory
 
     def inverse(self) -> CodedMapping:
         """The mapping back, by the same model.

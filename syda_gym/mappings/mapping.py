@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.robot import Robot
-from syda_gym.errors import MappingError
+from syda_gym.errors import MappingError, OptionError
 from syda_gym.mappings.card import MappingCard
 from syda_gym.mappings.limits import limit_speed
 from syda_gym.motions.clip import PairedMotions
@@ -122,9 +122,9 @@ class Mapping(ABC):
         return self._one(array) if array.ndim == 1 else self._within_limits(self.raw(self.source.check(array)))
 
     def sequence(self, frames: ArrayLike, fps: float) -> FloatArray:
-        """Maps a motion and limits the joint speeds causally.
+        """Maps a motion as ``follow`` does, and limits the joint speeds causally.
 
-        A motion within the speed limits passes unchanged, without any lag.
+        Frame by frame, a ``stream.FrameStream`` with the same ``fps`` does the same.
 
         Args:
             frames: ``(N, F_source)`` in time order, one clip.
@@ -132,9 +132,39 @@ class Mapping(ABC):
 
         Returns:
             ``(N, F_target)`` within joint limits and joint speed limits.
+
+        Raises:
+            OptionError: ``fps`` is not positive.
         """
-        mapped = self(np.atleast_2d(np.asarray(frames, dtype=np.float64)))
+        if not (np.isfinite(fps) and fps > 0.0):
+            raise OptionError(f"fps must be positive, got {fps}")
+        mapped, _ = self.follow(np.atleast_2d(np.asarray(frames, dtype=np.float64)), self.begin(), 1.0 / fps)
         return limit_speed(self.target, mapped, fps) if isinstance(self.target, Robot) else mapped
+
+    def begin(self) -> Any:
+        """What ``follow`` remembers before the first frame of a clip."""
+        return None
+
+    def follow(
+        self, frames: ArrayLike, memory: Any, dt: float | None = None, *, limited: bool = True, skip: int = 0
+    ) -> tuple[FloatArray, Any]:
+        """Maps frames in time order: among equally good joint angles the nearest to those of the frame before.
+
+        Args:
+            frames: ``(N, F_source)``, the next frames of a clip.
+            memory: from ``begin`` or the call before; a value that no call changes.
+            dt: time between frames [s]; without it joint speeds do not hold.
+            limited: whether the joints that follow limbs keep to their speeds.
+            skip: how many frames at the beginning are only looked back at, by a mapping with a window.
+
+        Returns:
+            ``(N - skip, F_target)`` within the target's joint limits, and the memory after them. How many frames come
+            in one call makes no difference. A mapping that remembers nothing maps each frame for itself.
+
+        Raises:
+            EmbodimentError: the frames are not frames of ``source``, or hold values that are not finite.
+        """
+        return self(np.atleast_2d(np.asarray(frames, dtype=np.float64)))[skip:], memory
 
     def __rshift__(self, after: Mapping) -> Mapping:
         """``a >> b``: the chain that applies ``a``, then ``b``."""

@@ -7,6 +7,7 @@ here the limbs are encoded in plain floats, the whole model is one affine map, a
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.mappings.coding.arm_coders import HumanArmCoder, RobotArmCoder
@@ -27,7 +28,7 @@ class SingleFrame:
 
     def __init__(self, source_coder: HumanArmCoder, regressor: Regressor, target_coder: RobotArmCoder) -> None:
         self._encode = source_coder.encode_one
-        self._decode = target_coder.decode_one
+        self._coder = target_coder
         self._regressor = regressor
         self._shape = (source_coder.body.n_features,)
         affine = regressor.affine()
@@ -42,12 +43,20 @@ class SingleFrame:
 
     def __call__(self, frame: FloatArray) -> FloatArray | None:
         """Joint angles ``(n,)`` [rad] within the limits, ``None`` for a frame that deserves a closer look."""
+        rows = self._codes(frame)
+        return None if rows is None else self._coder.decode_one(rows)
+
+    def follow(self, frame: FloatArray, memory: Any, dt: float | None, limited: bool) -> tuple[FloatArray, Any] | None:
+        """The same for the next frame of a clip, with the memory after it."""
+        rows = self._codes(frame)
+        return None if rows is None else self._coder.follow_one(rows, memory, dt, limited)
+
+    def _codes(self, frame: FloatArray) -> list[list[float]] | None:
+        """Codes of the robot, ``None`` if something is unusual about the frame or about them."""
         if frame.shape != self._shape or not math.isfinite(sum(frame.tolist())):
             return None
         codes = self._encode(frame)
         affine = self._affine
         mapped = self._regressor(codes) if affine is None else codes @ affine[0] + affine[1]
         rows: list[list[float]] = mapped.tolist()
-        if not all([math.isfinite(sum(row)) for row in rows]):
-            return None
-        return self._decode(rows)
+        return rows if all([math.isfinite(sum(row)) for row in rows]) else None

@@ -1,7 +1,8 @@
 """LIVE use: sources, the loop, sinks."""
 
 from syda_gym.teleoperation.calibration import Calibration, calibrate
-from syda_gym.teleoperation.incoming.sources import ReplaySource, Source, UdpSource, WebSocketSource
+from syda_gym.teleoperation.incoming.network import UdpSource, WebSocketSource
+from syda_gym.teleoperation.incoming.sources import ReplaySource, Source
 from syda_gym.teleoperation.journal import Journal, replay_journal
 from syda_gym.teleoperation.live_run import run
 from syda_gym.teleoperation.loop import TeleoperationLoop

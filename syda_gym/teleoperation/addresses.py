@@ -13,7 +13,8 @@ from syda_gym.errors import MotionError, OptionError, TeleoperationError, neares
 from syda_gym.motions.clip import MotionClip
 from syda_gym.motions.loading import load_motions
 from syda_gym.teleoperation.incoming.camera import CameraSource, FilmSource
-from syda_gym.teleoperation.incoming.sources import ReplaySource, Source, UdpSource, WebSocketSource
+from syda_gym.teleoperation.incoming.network import UdpSource, WebSocketSource
+from syda_gym.teleoperation.incoming.sources import ReplaySource, Source
 from syda_gym.teleoperation.outgoing.sinks import ManySinks, MemorySink, Sink, UdpSink
 
 __all__ = ["SINKS", "SOURCES", "host_and_port", "make_sink", "make_source", "read_token"]

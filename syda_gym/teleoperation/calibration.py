@@ -20,10 +20,12 @@ AXES: dict[str, FloatArray] = {
     "kinect": KINECT_AXES,
     "ros": np.eye(3),
     "camera": np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
+    "unity": np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
 }
 """Rotations from a source's axes to body axes (x forward, y left, z up): ``kinect`` = x to the subject's right, y up,
 z backward (the paper's); ``ros`` = x forward, y left, z up; ``camera`` = x to the right of the picture, y down, z away
-from a camera that the subject faces. The heading is measured, so a turn about the vertical does not matter."""
+from a camera that the subject faces; ``unity`` = x to the subject's right, y up, z forward, which is left-handed. The
+heading is measured, so a turn about the vertical does not matter."""
 
 _UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _ARM = (0.22, 1.2)  # m; shoulder to wrist of a small child and of a very tall adult
@@ -47,6 +49,7 @@ class Calibration:
         origin: median midpoint of the shoulders ``(3,)``, source axes and unit.
         yaw: heading of the person about the vertical [rad]; 0 is looking along the source's forward axis.
         lengths: measured limb lengths ``(arms, 2)`` [source unit].
+        width: measured distance of the shoulders [source unit], 0 with one arm.
         axes: name in ``AXES``.
         notices: what a person should know, for example that the source sends centimetres.
     """
@@ -57,6 +60,7 @@ class Calibration:
     origin: FloatArray = field(default_factory=lambda: np.zeros(3))
     yaw: float = 0.0
     lengths: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    width: float = 0.0
     axes: str = "kinect"
     notices: tuple[str, ...] = ()
 
@@ -67,6 +71,22 @@ class Calibration:
             standing = self.body.standing().reshape(-1, 3)
             object.__setattr__(self, "_matrix", matrix.tolist())
             object.__setattr__(self, "_middle", standing[::3].mean(axis=0).tolist())
+
+    @property
+    def measured(self) -> bool:
+        """Whether a person was measured, rather than a source trusted."""
+        return len(self.lengths) > 0
+
+    @property
+    def size(self) -> float:
+        """All limbs and the shoulders together [m]."""
+        return (float(self.lengths.sum()) + self.width) * _UNITS[self.unit]
+
+    @property
+    def metres(self) -> list[list[float]]:
+        """Rotation and unit ``(3, 3)`` that turn a point of the source into metres in body axes; the heading stays."""
+        matrix: list[list[float]] = (AXES[self.axes] * _UNITS[self.unit]).tolist()
+        return matrix
 
     def apply(self, frame: FloatArray) -> FloatArray:
         """One frame ``(F,)`` of the source as a frame ``(F,)`` of ``body``.
@@ -160,6 +180,7 @@ def calibrate(body: Embodiment, frames: ArrayLike, axes: str = "kinect") -> Cali
         origin=np.median(shoulders, axis=0),
         yaw=yaw or 0.0,
         lengths=typical,
+        width=_width(points),
         axes=axes,
         notices=tuple(notices),
     )
@@ -281,6 +302,13 @@ def _heading(points: FloatArray) -> float | None:
             "different in height; stand upright and face the camera"
         )
     return float(np.arctan2(-line[0], line[1]))
+
+
+def _width(points: FloatArray) -> float:
+    """Distance of the shoulders, 0 with one arm."""
+    if points.shape[1] != 2:
+        return 0.0
+    return float(np.median(np.linalg.norm(points[:, 0, 0] - points[:, 1, 0], axis=-1)))
 
 
 def _about_vertical(angle: float) -> FloatArray:

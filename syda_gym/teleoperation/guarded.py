@@ -62,6 +62,7 @@ class GuardedMapping:
         self._familiar = self._knows("unfamiliar", "no familiarity: unusual poses are not slowed")
         self._count = 0
         self._unfamiliar = False
+        self.reset()
         self._gains = [_gain(link) for link in self.links]
         self._bounds = [_constant_bound(link) for link in self.links]
         try:
@@ -69,9 +70,14 @@ class GuardedMapping:
         except (SydaError, ArithmeticError, ValueError) as error:
             raise TeleoperationError(f"{mapping!r} cannot map a person who stands still: {error}") from error
         self._count = 0
+        self.reset()
 
-    def __call__(self, frame: FloatArray) -> Mapped:
-        """Maps one frame ``(F,)`` of the mapping's source.
+    def reset(self) -> None:
+        """Forgets the frames before: the next one begins a new motion."""
+        self._memories = [link.begin() for link in self.links]
+
+    def __call__(self, frame: FloatArray, dt: float | None = None) -> Mapped:
+        """Maps one frame ``(F,)`` of the mapping's source, ``dt`` [s] after the one before (``Mapping.follow``).
 
         Raises:
             SydaError: whatever the mapping raises on a frame that it cannot take.
@@ -79,25 +85,33 @@ class GuardedMapping:
         # Familiarity changes slowly; a look at every third frame is enough and saves time.
         look = self._familiar and self._count % _EVERY == 0
         self._count += 1
-        mapped = self.walk(frame, look)
+        mapped = self.walk(frame, look, dt)
         if look:
             self._unfamiliar = mapped.unfamiliar
         return mapped._replace(unfamiliar=self._unfamiliar)
 
-    def walk(self, frame: FloatArray, look: bool) -> Mapped:
-        """The same without regard to frames before: familiarity is told only of those at which one looks.
+    def walk(self, frame: FloatArray, look: bool, dt: float | None = None) -> Mapped:
+        """The same, but without a count: familiarity is told only of frames at which one looks.
+
+        Without ``dt`` the frames before do not count either.
 
         Raises:
             SydaError: whatever the mapping raises on a frame that it cannot take.
         """
-        current, bound, unfamiliar = frame, 0.0, False
-        for link, gain, constant in zip(self.links, self._gains, self._bounds, strict=True):
+        current, bound, unfamiliar, memories = frame, 0.0, False, []
+        for link, memory, gain, constant in zip(self.links, self._memories, self._gains, self._bounds, strict=True):
             if self.bounded:
                 bound = bound * gain + (float(link.error_bound(current)[0]) if constant is None else constant)
             unfamiliar = unfamiliar or (look and bool(link.unfamiliar(current)[0]))
-            current = link(current)
+            if dt is None:
+                current = link(current)
+            else:
+                rows, memory = link.follow(current, memory, dt)
+                current = rows[0]
+            memories.append(memory)
         if not math.isfinite(sum(current.tolist())):
             raise TeleoperationError(f"{self.mapping!r} gave joint angles that are not finite")
+        self._memories = memories
         return Mapped(current, bound if self.bounded else float("nan"), unfamiliar)
 
     def _knows(self, question: str, notice: str) -> bool:

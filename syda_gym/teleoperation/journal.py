@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import gzip
+import hashlib
 import json
 import math
 import os
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,10 +22,11 @@ from syda_gym.mappings.mapping import Mapping
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.tick import Decision, LoopSettings, State, Tick
 
-__all__ = ["FORMAT", "Journal", "ReplayReport", "read_journal", "replay_journal"]
+__all__ = ["FORMAT", "Journal", "JournalLines", "ReplayReport", "read_journal", "replay_journal"]
 
-FORMAT = "syda-gym teleoperation journal 1"
+FORMAT = "syda-gym teleoperation journal 2"
 _MAX_LINE = 1 << 20
+_EVERY = 1.0  # s between two marks
 
 
 class Journal:
@@ -30,6 +34,9 @@ class Journal:
 
     A Python float written by ``json`` reads back as the same float, so nothing is lost. Unlike other files of this
     library the journal is written as it goes, for it must survive a crash; names ending in ``.gz`` are compressed.
+
+    Once a second a mark with the checksum of all lines so far is written and everything is handed to the operating
+    system; the last line is such a mark that says how many decisions there are. A file without it was cut off.
 
     Args:
         path: a new file.
@@ -44,6 +51,9 @@ class Journal:
         self, path: str | os.PathLike[str], loop: TeleoperationLoop, note: dict[str, Any] | None = None
     ) -> None:
         self.path = Path(path)
+        self._sum = hashlib.sha256()
+        self._ticks = 0
+        self._marked = -math.inf
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._file: IO[str] = _open(self.path, "xt")
@@ -64,7 +74,11 @@ class Journal:
         )
 
     def decided(self, tick: Tick, decision: Decision) -> None:
-        """Writes one tick and its decision."""
+        """Writes one tick and its decision.
+
+        Raises:
+            OSError: the disk is full, for example.
+        """
         line: dict[str, Any] = {"t": tick.now, "state": decision.state.value, "q": decision.command.tolist()}
         if tick.frame is not None:
             line["frame"] = tick.frame.tolist()
@@ -72,6 +86,12 @@ class Journal:
             line["tracking"] = tick.tracking
         if tick.controls:
             line["controls"] = list(tick.controls)
+        if tick.left is not None:
+            line["left"] = tick.left
+        if tick.leaving is not None:
+            line["leaving"] = tick.leaving
+        if tick.position is not None:
+            line["position"] = tick.position.tolist()
         if not math.isnan(decision.bound):
             line["bound"] = decision.bound if math.isfinite(decision.bound) else None
         if decision.factor != 1.0:
@@ -79,6 +99,11 @@ class Journal:
         if decision.reasons:
             line["reasons"] = list(decision.reasons)
         self._write(line)
+        self._ticks += 1
+        if tick.now - self._marked >= _EVERY:
+            self._marked = tick.now
+            self._mark("mark")
+            self.flush()
 
     def dropped(self, now: float, counts: dict[str, int]) -> None:
         """Writes how many packets have been dropped by ``now`` before they reached the loop, by reason."""
@@ -89,8 +114,25 @@ class Journal:
         self._file.flush()
 
     def close(self) -> None:
-        """Ends the file."""
-        if not self._file.closed:
+        """Writes the end mark and ends the file; harmless when repeated, or after ``abandon``.
+
+        Raises:
+            TeleoperationError: the end could not be written; a check of the file will say so too.
+        """
+        if self._file.closed:
+            return
+        try:
+            self._mark("end")
+            self._file.close()
+        except OSError as error:
+            self.abandon()
+            raise TeleoperationError(
+                f"the journal {self.path} could not be ended: {error.strerror or error}"
+            ) from error
+
+    def abandon(self) -> None:
+        """Lets go of the file as it is, after an error; it has no end mark then."""
+        with contextlib.suppress(OSError, ValueError):
             self._file.close()
 
     def __enter__(self) -> Journal:
@@ -99,8 +141,13 @@ class Journal:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _mark(self, kind: str) -> None:
+        self._write({kind: self._ticks, "sha256": self._sum.hexdigest()})
+
     def _write(self, value: dict[str, Any]) -> None:
-        self._file.write(json.dumps(value, separators=(",", ":")) + "\n")
+        line = json.dumps(value, separators=(",", ":")) + "\n"
+        self._sum.update(line.encode())
+        self._file.write(line)
 
 
 @dataclass(frozen=True)
@@ -112,12 +159,14 @@ class ReplayReport:
         same: how many of them were the same, bit for bit.
         first_difference: line of the first other decision, ``None`` if all are the same.
         commands: the replayed commands ``(ticks, n)`` [rad].
+        damage: empty, or why the file is not whole: cut off, or other than it was written.
     """
 
     ticks: int
     same: int
     first_difference: int | None
     commands: FloatArray
+    damage: str = ""
 
     @property
     def exact(self) -> bool:
@@ -125,12 +174,64 @@ class ReplayReport:
         return self.ticks == self.same > 0
 
 
-def read_journal(path: str | os.PathLike[str]) -> tuple[dict[str, Any], Iterator[tuple[int, Tick, Decision]]]:
+class JournalLines:
+    """Line number, tick and decision of each decision in a journal; made by ``read_journal``, to be walked once.
+
+    A last line that was cut off by a crash ends the walk.
+
+    Attributes:
+        damage: after the walk, empty or why the file is not whole.
+    """
+
+    def __init__(self, source: Path, file: IO[str], first: str) -> None:
+        self.damage = ""
+        self._source = source
+        self._file = file
+        self._sum = hashlib.sha256(first.encode())
+        self._ticks = 0
+        self._ended = False
+
+    def __iter__(self) -> Iterator[tuple[int, Tick, Decision]]:
+        number = 1
+        with self._file:
+            while (text := self._read()) is not None:
+                number += 1
+                if self._ended:
+                    self.damage = self.damage or f"line {number} stands behind the end mark"
+                try:
+                    line = json.loads(text)
+                    if "sha256" in line:
+                        self._compare(line, number)
+                    elif "dropped" not in line:
+                        yield number, _tick(line), _decision(line)
+                        self._ticks += 1
+                except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
+                    raise TeleoperationError(f"{self._source}, line {number}: not a decision: {error!r}") from error
+                self._sum.update(text.encode())
+        if not self._ended:
+            self.damage = self.damage or "it has no end mark: the run crashed, or the file was cut off"
+
+    def _read(self) -> str | None:
+        try:
+            text = self._file.readline(_MAX_LINE)
+        except (OSError, EOFError, UnicodeDecodeError, zlib.error) as error:
+            if not isinstance(error, EOFError):
+                self.damage = self.damage or f"unreadable from here on: {error}"
+            return None  # a compressed journal whose writer was killed
+        return text if text.endswith("\n") else None
+
+    def _compare(self, line: dict[str, Any], number: int) -> None:
+        same = line["sha256"] == self._sum.hexdigest() and line.get("end", line.get("mark")) == self._ticks
+        if not same:
+            self.damage = self.damage or f"what stands above line {number} is not what was written (checksum)"
+        self._ended = self._ended or "end" in line
+
+
+def read_journal(path: str | os.PathLike[str]) -> tuple[dict[str, Any], JournalLines]:
     """Reads a journal.
 
     Returns:
-        The first line, and an iterator over line number, tick and decision. A last line that was cut off by a crash
-        ends the iteration.
+        The first line, and the lines after it.
 
     Raises:
         TeleoperationError: no such file, not a journal, or a broken line; the message names the line.
@@ -140,14 +241,15 @@ def read_journal(path: str | os.PathLike[str]) -> tuple[dict[str, Any], Iterator
         raise TeleoperationError(f"no journal {source}; check the path")
     file = _open(source, "rt")
     try:
-        head = json.loads(file.readline(_MAX_LINE))
-    except (ValueError, OSError, EOFError, RecursionError) as error:
+        first = file.readline(_MAX_LINE)
+        head = json.loads(first)
+    except (ValueError, OSError, EOFError, RecursionError, zlib.error) as error:
         file.close()
         raise TeleoperationError(f"{source} is not a journal: {error}") from error
     if not isinstance(head, dict) or head.get("format") != FORMAT:
         file.close()
         raise TeleoperationError(f"{source} is not a journal; expected a first line with format {FORMAT!r}")
-    return head, _decisions(source, file)
+    return head, JournalLines(source, file, first)
 
 
 def replay_journal(path: str | os.PathLike[str], mapping: Mapping) -> ReplayReport:
@@ -188,27 +290,7 @@ def replay_journal(path: str | os.PathLike[str], mapping: Mapping) -> ReplayRepo
             same += 1
         elif first is None:
             first = number
-    return ReplayReport(ticks, same, first, np.array(commands).reshape(ticks, loop.robot.n_features))
-
-
-def _decisions(source: Path, file: IO[str]) -> Iterator[tuple[int, Tick, Decision]]:
-    with file:
-        number = 1
-        while True:
-            number += 1
-            try:
-                text = file.readline(_MAX_LINE)
-            except (OSError, EOFError, UnicodeDecodeError):
-                return  # a compressed journal whose writer was killed
-            if not text.endswith("\n"):
-                return
-            try:
-                line = json.loads(text)
-                if "dropped" in line:
-                    continue
-                yield number, _tick(line), _decision(line)
-            except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
-                raise TeleoperationError(f"{source}, line {number}: not a decision: {error!r}") from error
+    return ReplayReport(ticks, same, first, np.array(commands).reshape(ticks, loop.robot.n_features), decisions.damage)
 
 
 def _tick(line: dict[str, Any]) -> Tick:
@@ -219,6 +301,9 @@ def _tick(line: dict[str, Any]) -> Tick:
         sent=None if line.get("sent") is None else float(line["sent"]),
         tracking=float(line.get("tracking", 1.0)),
         controls=tuple(line.get("controls", ())),
+        left=None if line.get("left") is None else float(line["left"]),
+        leaving=None if line.get("leaving") is None else float(line["leaving"]),
+        position=None if line.get("position") is None else np.array(line["position"], dtype=np.float64),
     )
 
 

@@ -6,6 +6,8 @@ import gc
 import time
 from collections.abc import Callable
 
+from syda_gym.teleoperation.driver import Driver
+from syda_gym.teleoperation.ending import Ending
 from syda_gym.teleoperation.incoming.anticipation import Anticipation
 from syda_gym.teleoperation.incoming.inbox import Received
 from syda_gym.teleoperation.incoming.sources import Source
@@ -13,12 +15,14 @@ from syda_gym.teleoperation.journal import Journal
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.outgoing.sinks import Sink
-from syda_gym.teleoperation.tick import Decision, State, Tick
+from syda_gym.teleoperation.tick import Decision, State
 
 __all__ = ["run"]
 
 _GRACE = 1.5  # periods to wait for the frame after a frame
 _HOMEWARD = 90.0  # s; the longest way to rest at the end of a run; slow joints and detours take their time
+_REPEATS = 5  # how often a stop is sent at the end, for a network that loses packets
+_APART = 1e-3  # s; least time between two commands
 
 
 def run(
@@ -32,11 +36,15 @@ def run(
     seconds: float | None = None,
     rest_at_end: bool = True,
 ) -> LiveStatistics:
-    """Runs until the source ends, the time is over, or a KeyboardInterrupt; then eases to rest.
+    """Runs until the source ends, the time is over, or a signal (Ctrl-C, SIGTERM, SIGHUP); then eases to rest.
 
     A frame is acted on when it arrives. While none arrives the loop decides ``settings.rate`` times a second all the
     same, for the first time one and a half periods after a frame. The source and the sink must be started and open, the
     sink first, which may take a second; the source's clock is the loop's.
+
+    Requests are obeyed on the way to rest too: an emergency stop there ends the run where the robot stands, as does a
+    second signal. What fails beside the robot (journal, screen, one of several sinks) is dropped with a line among the
+    loop's notices, and the run goes on.
 
     Args:
         source: where frames come from.
@@ -50,103 +58,94 @@ def run(
 
     Returns:
         The statistics.
+
+    Raises:
+        TeleoperationError: the robot takes no commands any more.
     """
     stats = statistics or LiveStatistics()
-    driver = _Driver(source, loop, sink, journal, stats, on_decision)
+    driver = Driver(source, loop, sink, journal, stats, on_decision)
     frames = Anticipation(source, driver.rehearse)
-    # What exists now stays; the collector need not look at it again in the middle of a frame.
-    gc.collect()
-    gc.freeze()
-    try:
-        end = None if seconds is None else source.clock() + seconds
-        patience = period = 1.0 / loop.settings.rate
-        while end is None or source.clock() < end:
-            received = frames.take(patience)
-            driver.step(received)
-            # A stream of the loop's own rate must not find the loop just deciding that no frame came.
-            patience = period if received.packet is None else _GRACE * period
-            if source.inbox.closed:
-                break
-    except KeyboardInterrupt:
-        pass
-    finally:
-        gc.unfreeze()
-    if rest_at_end and loop.state is not State.STOPPED:
-        driver.go_to_rest()
-    if journal is not None:
-        journal.flush()
+    with Ending() as ending:
+        # What exists now stays; the collector need not look at it again in the middle of a frame.
+        gc.collect()
+        gc.freeze()
+        try:
+            _follow(driver, frames, ending, seconds)
+        except KeyboardInterrupt:
+            pass
+        except BaseException:
+            _leave_safely(driver, ending, rest_at_end)
+            raise
+        finally:
+            gc.unfreeze()
+        if rest_at_end and loop.state is not State.STOPPED and not driver.gone:
+            try:
+                _go_to_rest(driver, ending)
+            except BaseException:
+                driver.stop()
+                raise
+        driver.flush()
+    driver.raise_if_gone()
     return stats
 
 
-class _Driver:
-    """One step of the real-time loop, and the way home."""
+def _follow(driver: Driver, frames: Anticipation, ending: Ending, seconds: float | None) -> None:
+    source = driver.source
+    end = None if seconds is None else source.clock() + seconds
+    patience = period = 1.0 / driver.loop.settings.rate
+    while (end is None or source.clock() < end) and not driver.gone:
+        received = driver.take(frames, patience)
+        driver.step(received)
+        if ending.asked or source.inbox.closed:
+            return
+        # A stream of the loop's own rate must not find the loop just deciding that no frame came.
+        patience = period if received.packet is None else _GRACE * period
+        if received.packet is None and received.controls:
+            time.sleep(_APART)  # requests in a flood must not make a flood of commands
 
-    def __init__(
-        self,
-        source: Source,
-        loop: TeleoperationLoop,
-        sink: Sink,
-        journal: Journal | None,
-        stats: LiveStatistics,
-        on_decision: Callable[[Decision], None] | None,
-    ) -> None:
-        self.source = source
-        self.loop = loop
-        self.sink = sink
-        self.journal = journal
-        self.stats = stats
-        self.on_decision = on_decision
-        self._dropped = 0
 
-    def step(self, received: Received) -> Decision:
-        """Decides and sends; everything else comes after."""
-        packet, clock = received.packet, self.source.clock
-        tick = Tick(
-            now=clock(),
-            frame=None if packet is None else packet.frame,
-            sent=None if packet is None else packet.sent,
-            tracking=1.0 if packet is None else packet.tracking,
-            controls=received.controls,
-        )
-        decision = self.loop.step(tick)
-        if "stop" in received.controls:
-            self.sink.stop()
-        self.sink.send(decision)
-        sent = clock()
-        if packet is not None:
-            self.stats.latency(sent - received.arrived)
-            self.stats.bound = decision.bound
-        self.stats.command(sent, decision.state.value)
-        for reason in decision.reasons:
-            self.stats.reasons[reason.split(":")[0] if reason.startswith(("frame", "mapping")) else reason] += 1
-        if self.journal is not None:
-            self._write(self.journal, tick, decision)
-        if self.on_decision is not None:
-            self.on_decision(decision)
-        self.loop.settle()
-        return decision
+def _go_to_rest(driver: Driver, ending: Ending) -> None:
+    """Asks for rest and keeps deciding until the robot is there; frames are left unread, requests are not."""
+    begun, signals = driver.source.clock(), ending.asked
+    controls: tuple[str, ...] = ("resume", "rest")
+    while driver.source.clock() - begun < _HOMEWARD and not driver.gone:
+        state = driver.step(Received(None, 0.0, controls)).state
+        if state is State.RESTING:
+            return
+        if state is State.STOPPED:
+            _repeat(driver)
+            return
+        heard = _listen(driver, ending, signals, 1.0 / driver.loop.settings.rate)
+        # Whoever resumes on the way home goes on home.
+        controls = tuple(c for control in heard for c in (("resume", "rest") if control == "resume" else (control,)))
 
-    def rehearse(self) -> None:
-        """What ``step`` does with a frame, without effect."""
-        self.source.rehearse()
-        self.loop.rehearse()
-        self.sink.rehearse()
 
-    def go_to_rest(self) -> None:
-        """Asks for rest and keeps deciding until the robot is there; frames are left unread."""
-        begun = self.source.clock()
-        controls: tuple[str, ...] = ("resume", "rest")
-        while self.source.clock() - begun < _HOMEWARD:
-            decision = self.step(Received(None, 0.0, controls))
-            controls = ()
-            if decision.state is State.RESTING:
-                return
-            time.sleep(1.0 / self.loop.settings.rate)
+def _listen(driver: Driver, ending: Ending, signals: int, seconds: float) -> list[str]:
+    """Requests of the next moments, as soon as one comes."""
+    end = time.monotonic() + seconds
+    heard: list[str] = []
+    while not heard:
+        if ending.asked > signals:
+            return ["stop"]
+        driver.source.inbox.reopen()
+        left = end - time.monotonic()
+        if left <= 0.0:
+            break
+        heard += [control for control in driver.take(driver.source, left).controls if control != "calibrate"]
+    return heard
 
-    def _write(self, journal: Journal, tick: Tick, decision: Decision) -> None:
-        dropped = self.source.inbox.dropped
-        total = sum(dropped.values())
-        if total != self._dropped:
-            journal.dropped(tick.now, dict(dropped))
-            self._dropped = total
-        journal.decided(tick, decision)
+
+def _repeat(driver: Driver) -> None:
+    for _ in range(_REPEATS):
+        time.sleep(1.0 / driver.loop.settings.rate)
+        driver.step(Received(None, 0.0, ()))
+
+
+def _leave_safely(driver: Driver, ending: Ending, rest_at_end: bool) -> None:
+    """After a failure that nobody foresaw: to rest if that goes, else a stop; the caller raises the failure."""
+    try:
+        if rest_at_end and driver.loop.state is not State.STOPPED and not driver.gone:
+            _go_to_rest(driver, ending)
+        driver.flush()
+    except BaseException:
+        driver.stop()

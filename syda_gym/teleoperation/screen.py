@@ -87,7 +87,8 @@ def keyboard(inbox: Inbox) -> Iterator[bool]:
     finally:
         ending.set()
         thread.join(timeout=1.0)
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        with contextlib.suppress(termios.error, OSError):  # a terminal that was closed
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
 
 
 def _read_keys(descriptor: int, inbox: Inbox, ending: threading.Event) -> None:
@@ -96,9 +97,14 @@ def _read_keys(descriptor: int, inbox: Inbox, ending: threading.Event) -> None:
         if not ready:
             continue
         # Unbuffered: sys.stdin would swallow keys typed together, and one of them may be the emergency stop.
-        for key in os.read(descriptor, 64).decode("utf-8", "replace"):
+        try:
+            typed = os.read(descriptor, 64)
+        except OSError:  # the terminal hung up
+            return
+        if not typed:
+            return
+        for key in typed.decode("utf-8", "replace"):
             if key == "q":
-                inbox.close()
-                return
-            if key in KEYS:
+                inbox.close()  # and go on reading: the way home can be stopped too
+            elif key in KEYS:
                 inbox.request(KEYS[key])

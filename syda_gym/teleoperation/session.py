@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.errors import OptionError
+from syda_gym.errors import OptionError, TeleoperationError
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.teleoperation.addresses import make_sink, make_source
 from syda_gym.teleoperation.incoming.sources import Source
@@ -92,7 +91,8 @@ def teleoperate(
         sinks, probe.robot, token=token, rate=chosen.rate, operator=mapping.source
     )  # fmt: skip
     with sink:
-        start = _where(sink)
+        # A run begins where the robot's joints are rather than with a jump.
+        start = sink.angles()
         loop = probe if start is None else TeleoperationLoop(mapping, chosen, start)
         _show_operator(sink, loop)
         written = None if journal is None else Journal(Path(journal), loop, note)
@@ -106,7 +106,10 @@ def teleoperate(
                 )
         finally:
             if written is not None:
-                written.close()
+                try:
+                    written.close()
+                except TeleoperationError as error:  # the robot is home; the check of the journal will tell too
+                    loop.notices.append(str(error))
 
 
 def _show_operator(sink: Sink, loop: TeleoperationLoop) -> None:
@@ -115,9 +118,3 @@ def _show_operator(sink: Sink, loop: TeleoperationLoop) -> None:
         accompany = getattr(each, "accompany", None)
         if accompany is not None:
             accompany(lambda: loop.frame)
-
-
-def _where(sink: Sink) -> FloatArray | None:
-    """Where the robot's joints are now, if the sink can tell; a run begins there rather than with a jump."""
-    ask = getattr(sink, "angles", None)
-    return None if ask is None else ask()

@@ -9,10 +9,13 @@ from typing import Any
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import OptionError, nearest_name
 
-__all__ = ["CONTROLS", "Decision", "LoopSettings", "State", "Tick"]
+__all__ = ["CONTROLS", "RESTRAINING", "Decision", "LoopSettings", "State", "Tick"]
 
 CONTROLS = ("pause", "resume", "stop", "release", "calibrate", "rest")
 """What an operator may ask for: hold; go on; emergency stop; end the emergency stop; calibrate anew; ease to rest."""
+
+RESTRAINING = frozenset({"stop", "pause", "rest"})
+"""What makes a robot safer, and is therefore obeyed from whomever it comes and however late."""
 
 
 class State(StrEnum):
@@ -38,6 +41,9 @@ class LoopSettings:
         cutoff: lowest cutoff of the One-Euro filter [Hz]; 0 switches the filter off.
         beta: growth of the cutoff with speed [Hz per rad/s].
         speed: share of the joints' speed limits that may be used.
+        acceleration: greatest acceleration of every joint [rad/s^2]; ``None`` for full speed within 0.2 s.
+        jerk: greatest jerk of every joint [rad/s^3]; ``None`` for no limit. Where the robot must brake to keep clear of
+            a limit or of itself, the acceleration counts and the jerk does not.
         ease: share of the speed limits on the way to rest.
         soft_start: seconds over which the speed grows when following begins.
         silence: seconds without a good frame until the robot holds.
@@ -57,6 +63,8 @@ class LoopSettings:
     cutoff: float = 2.0
     beta: float = 3.0
     speed: float = 1.0
+    acceleration: float | None = None
+    jerk: float | None = None
     ease: float = 0.2
     soft_start: float = 1.0
     silence: float = 0.25
@@ -82,6 +90,10 @@ class LoopSettings:
             value = getattr(self, name)
             if not low <= value <= high:
                 raise OptionError(f"{name} must be between {low:g} and {high:g}, got {value}")
+        for name, low, high in (("acceleration", 0.1, 1e4), ("jerk", 1.0, 1e6)):
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise OptionError(f"{name} must be between {low:g} and {high:g}, or None, got {value}")
 
     def to_json(self) -> dict[str, Any]:
         """All values by name."""
@@ -111,6 +123,9 @@ class Tick:
         sent: the sender's own time of the frame [s], or ``None``.
         tracking: confidence of the source in the frame, 0 to 1.
         controls: requests out of ``CONTROLS``, in order.
+        left: when the command before had left, at the latest [s, the loop's clock], or ``None`` if not known.
+        leaving: when it left at the earliest [s], or ``None``.
+        position: joint angles ``(n,)`` [rad] that the robot says it has, asked at a release, or ``None``.
     """
 
     now: float
@@ -118,6 +133,9 @@ class Tick:
     sent: float | None = None
     tracking: float = 1.0
     controls: tuple[str, ...] = ()
+    left: float | None = None
+    leaving: float | None = None
+    position: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -53,6 +53,7 @@ def test_a_replay_gives_the_same_bits(
     commands = play(tmp_path / name, mapping, adult, wave)
     report = replay_journal(tmp_path / name, mapping)
     assert report.exact
+    assert not report.damage
     assert (report.ticks, report.first_difference) == (380, None)
     assert report.commands.tobytes() == commands.tobytes()
 
@@ -69,6 +70,7 @@ def test_a_changed_command_or_frame_is_found(
     (tmp_path / "run.jsonl").write_text("\n".join(lines) + "\n")
     report = replay_journal(tmp_path / "run.jsonl", mapping)
     assert not report.exact
+    assert "not what was written" in report.damage
     assert report.first_difference == where + 1
 
 
@@ -82,6 +84,7 @@ def test_a_journal_cut_off_by_a_crash_is_read_up_to_there(
         report = replay_journal(tmp_path / name, mapping)
         assert report.exact
         assert 100 < report.ticks < 380
+        assert "no end mark" in report.damage
 
 
 def test_another_mapping_another_file_or_a_broken_line_is_refused(
@@ -116,6 +119,6 @@ def test_a_first_line_with_values_of_other_kinds_is_refused(
 ) -> None:
     path = tmp_path / "run.jsonl"
     Journal(path, TeleoperationLoop(mapping)).close()
-    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}) + "\n")
+    path.write_text(json.dumps(json.loads(path.read_text().splitlines()[0]) | {key: value}) + "\n")
     with pytest.raises(TeleoperationError, match="line 1: "):
         replay_journal(path, mapping)

@@ -18,8 +18,9 @@ from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, TeleoperationError
 from syda_gym.motions.clip import MotionClip
+from syda_gym.teleoperation.incoming.network import UdpSource, WebSocketSource
 from syda_gym.teleoperation.incoming.packets import encode_frame, encode_request
-from syda_gym.teleoperation.incoming.sources import ReplaySource, Source, UdpSource, WebSocketSource
+from syda_gym.teleoperation.incoming.sources import ReplaySource, Source
 from syda_gym.teleoperation.journal import Journal, replay_journal
 from syda_gym.teleoperation.live_run import run
 from syda_gym.teleoperation.live_statistics import LiveStatistics

@@ -51,8 +51,11 @@ class Stage:
     def check(self, robot: Robot) -> None:
         times = np.array([decision.now for decision in self.decisions])
         assert not robot.violations(self.path, 0.0).any()
-        speed = np.abs(np.diff(self.path, axis=0)) / np.diff(times)[:, None]
-        assert (speed <= robot.speed * (1 + 1e-9)).all()
+        velocity = np.diff(self.path, axis=0) / np.diff(times)[:, None]
+        assert (np.abs(velocity) <= robot.speed * (1 + 1e-9)).all()
+        change = np.abs(np.diff(velocity, axis=0)) / (0.5 * (np.diff(times)[1:] + np.diff(times)[:-1]))[:, None]
+        stopped = np.array([decision.state is State.STOPPED for decision in self.decisions[2:]])
+        assert (change[~stopped] <= self.loop.acceleration * (1 + 1e-6)).all()
 
 
 def test_it_waits_for_the_calibration_then_starts_gently(
@@ -83,8 +86,8 @@ def test_no_command_touches_the_robot_s_own_body(mapping: LimbMapping, adult: Hu
     rng, held = np.random.default_rng(2), 0
     for _ in range(60):
         mapping.fixed = pepper.clamp(rng.uniform(pepper.lower, pepper.upper))[0]
-        for _ in range(4):
-            decision = stage.feed(adult.standing())
+        for count in range(20):
+            decision = stage.feed(adult.standing() + 1e-4 * count)
             held += "self-collision: held back" in decision.reasons
             assert not check.touches(decision.command)
     assert held > 5, "some of these poses do touch"
@@ -142,8 +145,9 @@ def test_poor_tracking_and_unfamiliar_poses_slow_it(mapping: LimbMapping, adult:
 
 def test_pause_stop_and_rest(mapping: LimbMapping, adult: HumanSkeleton, wave: Wave, pepper: Robot) -> None:
     stage = Stage(mapping).calibrated(adult).run(wave, 2.0)
-    paused = stage.feed(wave(2.0), "pause")
-    assert paused.state is State.PAUSED
+    assert stage.feed(wave(2.0), "pause").state is State.PAUSED
+    for _ in range(8):  # it brakes as it accelerates
+        paused = stage.feed(wave(2.0))
     assert all((stage.feed(wave(2 + i * DT)).command == paused.command).all() for i in range(60)), "a pause has no end"
     waiting = stage.feed(None, "resume")
     assert waiting.state is State.HOLDING, "nobody moves yet"

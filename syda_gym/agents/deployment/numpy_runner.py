@@ -19,6 +19,7 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import AgentError
 from syda_gym.files import asset
 from syda_gym.mappings.limits import SpeedLimiter
+from syda_gym.mappings.stream import FrameStream
 
 if TYPE_CHECKING:
     from syda_gym.mappings.mapping import Mapping as MotionMapping
@@ -31,7 +32,8 @@ __all__ = ["Runner", "bundle_path", "check_pairing", "find_mapping", "stored_int
 class Runner:
     """Drives one robot: operator frame in, joint command out.
 
-    As in the environment, the base command follows the mapping no faster than the joint speed limits allow.
+    As in the environment, frames are mapped in time order, and the base command follows the mapping no faster than the
+    joint speed limits allow.
 
     Args:
         agent: who acts.
@@ -44,6 +46,7 @@ class Runner:
     def __init__(self, agent: Agent, mapping: MotionMapping) -> None:
         check_pairing(agent, mapping)
         self.agent, self.mapping = agent, mapping
+        self._stream = FrameStream(mapping, 1.0 / agent.interface.dt)
         self._limiter = SpeedLimiter(agent.interface.robot, 1.0 / agent.interface.dt)
         self._observation = np.zeros((1, agent.interface.size))
 
@@ -65,6 +68,7 @@ class Runner:
     def reset(self) -> None:
         """Begins an episode."""
         self.agent.reset(1)
+        self._stream.reset()
         self._limiter.reset()
 
     def step(self, frame: ArrayLike, q: ArrayLike, *, qd: ArrayLike | None = None, age: float = 0.0) -> FloatArray:
@@ -81,7 +85,7 @@ class Runner:
         """
         layout, row = self.agent.interface.layout, self._observation[0]
         row[layout["operator"]] = frame
-        row[layout["base_error"]] = self._limiter(self.mapping(np.asarray(frame, dtype=np.float64))) - np.asarray(q)
+        row[layout["base_error"]] = self._limiter(self._stream(frame)) - np.asarray(q)
         row[layout["q"]] = q
         row[layout["qd"]] = 0.0 if qd is None else qd
         row[layout["packet_age"]] = age

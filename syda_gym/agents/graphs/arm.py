@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
+from numpy.typing import ArrayLike
 from torch import Tensor, nn
 
-from syda_gym.agents.graphs.arithmetic import constant, cross
+from syda_gym.agents.graphs.arithmetic import constant, cross, dot, norm
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.kinematics.arm_chain import ArmChain
 
@@ -22,11 +23,13 @@ class ArmKinematics(nn.Module):
 
     Args:
         chain: the arm.
-        movers: joints by which ``jacobian`` differentiates.
+        movers: joints by which ``limbs`` differentiates.
+        twisting: 1 for movers that turn the elbow's own axis about the upper arm, else 0.
     """
 
-    def __init__(self, chain: ArmChain, movers: Sequence[int] = ()) -> None:
+    def __init__(self, chain: ArmChain, movers: Sequence[int] = (), twisting: ArrayLike = ()) -> None:
         super().__init__()
+        self.twisting = constant(twisting)
         self.carriers = chain.point_joints[:_POINTS]
         self.offsets = [constant(offset[:, None]) for offset in chain.point_offsets[:_POINTS]]
         self.movers = tuple(movers)
@@ -39,18 +42,21 @@ class ArmKinematics(nn.Module):
         """Points ``(B, 3, 3)`` [m] in the torso frame for angles ``(B, n)`` [rad]."""
         return self._walk(angles)[0]
 
-    def relative(self, angles: Tensor) -> Tensor:
-        """Elbow and wrist from the shoulder, ``(B, 6)`` [m]."""
-        points = self._walk(angles)[0]
-        return (points[:, 1:] - points[:, :1]).reshape(-1, 6)
+    def limbs(self, angles: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """``kernel.look``: unit upper arm and forearm ``(B, 6)``, their derivatives, and turns about the arm's length.
 
-    def jacobian(self, angles: Tensor) -> tuple[Tensor, Tensor]:
-        """``relative`` and its derivative by the movers ``(B, 6, movers)`` [m/rad]."""
+        The derivatives by the movers are ``(B, m, 6)``, the turns ``(B, m)``.
+        """
         points, origins, axes = self._walk(angles)
         arms = points[:, None] - origins[:, :, None]
         speeds = cross(axes[:, :, None] + 0.0 * arms, arms) * self.moved
-        columns = (speeds[:, :, 1:] - speeds[:, :, :1]).reshape(-1, len(self.movers), 6)
-        return (points[:, 1:] - points[:, :1]).reshape(-1, 6), columns.transpose(1, 2)
+        along = points[:, 1:] - points[:, :-1]
+        length = norm(along)
+        along = along / length
+        moved = speeds[:, :, 1:] - speeds[:, :, :-1]
+        moved = (moved - along[:, None] * dot(along[:, None], moved)) / length[:, None]
+        turning = self.twisting * (axes * along[:, :1]).sum(dim=-1)
+        return along.reshape(-1, 6), moved.reshape(-1, len(self.movers), 6), turning
 
     def _walk(self, angles: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Points ``(B, 3, 3)``, origins and axes of the movers ``(B, movers, 3)``."""

@@ -1,4 +1,4 @@
-"""Coders as modules: frames ``(B, F)`` to codes ``(B, K, D)`` and back."""
+"""Coders as modules: frames ``(B, F)`` to codes ``(B, K, D)``, and back with what a sequence remembers."""
 
 from __future__ import annotations
 
@@ -35,13 +35,19 @@ def encoder_of(coder: Coder) -> nn.Module:
     return _modules(coder)[0](coder)
 
 
-def decoder_of(coder: Coder) -> nn.Module:
-    """The module that decodes.
+def decoder_of(coder: Coder, dt: float) -> tuple[nn.Module, int]:
+    """The module that decodes frames ``dt`` [s] apart, and the size of its state.
+
+    It makes frames and the next state of ``(codes, state, fresh)``.
 
     Raises:
         AgentError: this kind of code has no graph.
     """
-    return _modules(coder)[1](coder)
+    kind = _modules(coder)[1]
+    if isinstance(coder, RobotArmCoder):
+        arms = _DecodeRobotArms(coder, dt)
+        return arms, arms.state_size
+    return _Stateless(kind(coder)), 0
 
 
 def _modules(coder: Coder) -> tuple[type[nn.Module], type[nn.Module]]:
@@ -51,6 +57,17 @@ def _modules(coder: Coder) -> tuple[type[nn.Module], type[nn.Module]]:
             f"{', '.join(kind.kind for kind in CODERS)} can; export the agent alone and map with the numpy runner"
         )
     return CODERS[type(coder)]
+
+
+class _Stateless(nn.Module):
+    """A decoder that remembers nothing."""
+
+    def __init__(self, decoder: nn.Module) -> None:
+        super().__init__()
+        self.decoder = decoder
+
+    def forward(self, codes: Tensor, state: Tensor, fresh: Tensor) -> tuple[Tensor, Tensor]:
+        return self.decoder(codes), state
 
 
 class _Encode(nn.Module):
@@ -175,35 +192,42 @@ class _EncodeRobotArms(nn.Module):
 
 
 class _DecodeRobotArms(nn.Module):
-    def __init__(self, coder: RobotArmCoder) -> None:
+    """``RobotArmCoder.follow``: codes and the solver's state to angles and the next state."""
+
+    def __init__(self, coder: RobotArmCoder, dt: float) -> None:
         super().__init__()
         robot = coder.robot
-        solvers = LimbIK(robot).single_arms
-        if not solvers:
-            raise AgentError(
-                f"the arms of {robot.name!r} have no closed-form inverse kinematics, so that their decoding cannot be "
-                "written as a graph; export the agent alone and map with the numpy runner"
-            )
+        solver = LimbIK.of(robot)
         self.arms = [robot.sides.index(side) for side in coder.sides]
         self.parts = robot.arm_slices
-        self.limbs = nn.ModuleList(LimbGraph(robot.chains[arm], solvers[arm]) for arm in self.arms)
+        self.limbs = nn.ModuleList(
+            LimbGraph(chain, arm, dt) for chain, arm in zip(robot.chains, solver.arms, strict=True)
+        )
+        self.sizes = [2 * len(arm.lower) + 3 for arm in solver.arms]
+        self.state_size = solver.state_size
         self.signs = _signs(coder.sides)[:, 0]
         self.rest = constant(coder.rest)
         self.extra, self.extra_signs = coder.extra_columns.tolist(), constant(coder.extra_signs)
         self.hanging = constant([0.0, 0.0, -1.0])
         self.clamp = robot_clamp(robot)
 
-    def forward(self, codes: Tensor) -> Tensor:
+    def forward(self, codes: Tensor, state: Tensor, fresh: Tensor) -> tuple[Tensor, Tensor]:
         frames = self.rest + 0.0 * codes[:, 0, :1]
         columns = list(torch.split(frames, 1, dim=1))
-        for index, (arm, limb) in enumerate(zip(self.arms, self.limbs, strict=True)):
+        after = []
+        for arm, (limb, own) in enumerate(zip(self.limbs, torch.split(state, self.sizes, dim=1), strict=True)):
+            if arm not in self.arms:
+                after.append(own)
+                continue
+            index = self.arms.index(arm)
             upper, fore = (self._direction(codes[:, index, at : at + 3] * self.signs[index]) for at in (0, 3))
-            part = self.parts[arm]
-            columns[part] = torch.split(limb(upper, fore), 1, dim=1)
+            angles, remembered = limb(torch.cat([upper, fore], dim=1), own, fresh)
+            after.append(remembered)
+            columns[self.parts[arm]] = torch.split(angles, 1, dim=1)
             for extra, column in enumerate(self.extra[index]):
                 columns[column] = codes[:, index, 6 + extra : 7 + extra] * self.extra_signs[index, extra]
         result: Tensor = self.clamp(torch.cat(columns, dim=1))
-        return result
+        return result, torch.cat(after, dim=1)
 
     def _direction(self, vector: Tensor) -> Tensor:
         """Unit length; a vanishing direction becomes a hanging arm, as in ``RobotArmCoder``."""

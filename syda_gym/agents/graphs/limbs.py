@@ -1,216 +1,171 @@
-"""LimbGraph: the inverse kinematics on limb directions as a graph, equal to ``SingleArmIK`` frame by frame."""
+"""LimbGraph: the limb solver of one arm as a graph, equal to ``limb_ik.kernel`` frame by frame."""
 
 from __future__ import annotations
-
-import warnings
-from typing import Any
 
 import torch
 from torch import Tensor, nn
 
 from syda_gym.agents.graphs.arithmetic import angle_of, constant, cosine, cross, dot, norm, wrapped
 from syda_gym.agents.graphs.arm import ArmKinematics
-from syda_gym.agents.graphs.limits import Clamp
+from syda_gym.agents.graphs.descent import Descent, miss_of
+from syda_gym.agents.graphs.limits import ArmLimits
 from syda_gym.embodiments.kinematics.arm_chain import ArmChain
-from syda_gym.embodiments.limb_ik.single_arm import EXACT, FLAT, STEPS, SingleArmIK
+from syda_gym.embodiments.limb_ik import kernel
+from syda_gym.embodiments.limb_ik.arm import Arm
 
 __all__ = ["LimbGraph"]
 
-_FAR = 1e9  # farther from rest than any pose
-
 
 class LimbGraph(nn.Module):
-    """Joint angles ``(B, n)`` [rad] of one arm for unit directions of upper arm and forearm ``(B, 3)`` each.
-
-    The closed form and the choice among its solutions are those of ``SingleArmIK``; where the limits forbid all of
-    them, a loop of the graph takes the same projected Levenberg-Marquardt steps until every row has ended.
+    """What ``LimbIK.follow`` does for one arm of ``B`` robots, with the state of ``limb_ik.kernel.follow_arm``.
 
     Args:
         chain: kinematics of the arm.
-        solver: whose results it gives.
+        arm: the same as the solver has it.
+        dt: time between frames [s].
+
+    Attributes:
+        state_size: numbers of the state.
     """
 
-    def __init__(self, chain: ArmChain, solver: SingleArmIK) -> None:
+    def __init__(self, chain: ArmChain, arm: Arm, dt: float) -> None:
         super().__init__()
-        self.solver = solver
-        self.kinematics = ArmKinematics(chain, solver.movers)
-        self.clamp = Clamp(solver.lower, solver.upper, solver.couplings)
-        self.rest = constant(solver.rest)
-        self.middle = constant(solver.middle)
-        self.axes = [constant(solver.axes[joint]) for joint in solver.movers]
-        self.zero = (constant(solver.upper_zero), constant(solver.fore_zero))
-        self.joints = chain.n_joints
-        self.loop = _loop(_Step(self.kinematics, self.clamp), chain.n_joints, len(solver.movers))
+        self.arm, self.dt, self.joints = arm, dt, chain.n_joints
+        self.state_size = 2 * self.joints + 3
+        self.kinematics = ArmKinematics(chain, [int(joint) for joint in arm.movers], arm.twisting)
+        self.limits = ArmLimits(arm)
+        self.descent = Descent(self.kinematics, self.limits, self.joints)
+        self.lower, self.upper = constant(arm.lower), constant(arm.upper)
+        self.rest, self.reach = constant(arm.rest), constant(arm.speed * dt * kernel.WITHIN)
+        self.speed = constant(arm.speed)
+        self.bends = torch.arange(self.joints) == int(arm.hinge)
+        self.seeds = [constant(seed) for seed in arm.seeds]
+        self.turns = constant(arm.turns)
+        self.hold = arm.habits.glue * kernel.FRAME / dt
 
-    def forward(self, upper: Tensor, fore: Tensor) -> Tensor:
-        """The angles."""
-        elbow = self.solver.lengths[0] * upper
-        goal = torch.cat([elbow, elbow + self.solver.lengths[1] * fore], dim=1)
-        candidates = self._candidates(upper, fore)
-        # All candidates pass the kinematics together, one block of rows after the other.
-        inside = self.clamp(torch.cat([angles for angles, _ in candidates]))
-        error = norm(self.kinematics.relative(inside) - goal.repeat(len(candidates), 1))
-        inside = inside.reshape(len(candidates), -1, self.joints)
-        error = error.reshape(len(candidates), -1, 1)
-        far = _FAR + 0.0 * upper[:, :1]
-        solved, best, least, score = candidates[0][0], inside[0], far, far
-        for index, (angles, real) in enumerate(candidates):
-            value = error[index] + self._pull(inside[index])
-            better = value < score
-            best, score = torch.where(better, inside[index], best), torch.where(better, value, score)
-            if self.solver.exact:
-                fits = (inside[index] - angles).abs().sum(dim=1, keepdim=True) == 0.0
-                pull = self._pull(angles)
-                better = fits & real & (pull < least)
-                solved, least = torch.where(better, angles, solved), torch.where(better, pull, least)
-        found = least < _FAR
-        residual, columns = self.kinematics.jacobian(best)
-        residual = residual - goal
-        cost = dot(residual, residual)
-        active = (~found & (torch.sqrt(cost) > EXACT)).to(torch.float64)
-        refined = self.loop(best, residual, columns, cost, 1e-4 + 0.0 * cost, active, goal)
-        return torch.where(found, solved, refined)
+    def forward(self, target: Tensor, state: Tensor, fresh: Tensor) -> tuple[Tensor, Tensor]:
+        """Angles ``(B, n)`` [rad] and the next state, for unit upper arm and forearm ``(B, 6)``.
 
-    def _pull(self, angles: Tensor) -> Tensor:
-        return 1e-6 * (angles - self.rest).abs().sum(dim=1, keepdim=True)
+        Args:
+            target: wanted directions.
+            state: ``(B, state_size)``; not read where ``fresh``.
+            fresh: ``(B, 1)``, 1 in the first frame of a sequence.
+        """
+        n, begun = self.joints, fresh < 0.5
+        before = torch.where(begun, state[:, :n], self.rest + 0.0 * state[:, :n])
+        goal = torch.where(begun, state[:, n : 2 * n], before)
+        patience, going = state[:, 2 * n : 2 * n + 1], begun & (state[:, 2 * n + 1 : 2 * n + 2] > 0.5)
+        flexion = norm(cross(target[:, :3], target[:, 3:]))
+        bend = state[:, 2 * n + 2 :]
+        bend = torch.minimum(flexion, bend + (flexion - bend) * (self.dt / (self.dt + self.arm.habits.opening)))
+        bend = torch.where(begun, bend, flexion)
+        lower = torch.maximum(self.lower + 0.0 * before, before - self.reach)
+        upper = torch.minimum(self.upper + 0.0 * before, before + self.reach)
+        firm = (self.arm.habits.stiff / (bend * bend * bend * bend + 1e-12)).clamp(max=self.arm.habits.firm) * (
+            kernel.FRAME / self.dt
+        )
+        hold = self.hold + 0.0 * firm
+        near, miss = self.descent(before, target, lower, upper, before, hold, firm, begun & ~going)
+        calm = begun & ~going & (miss < self.arm.habits.calm)
+        whole = self.lower + 0.0 * before, self.upper + 0.0 * before
+        along, reached = self.descent(goal, target, *whole, goal, kernel.REST + 0.0 * hold, 0.0 * firm, begun & ~calm)
+        other, best = self._solve(target, before, ~calm)
+        patience = (patience + (reached - best - self.arm.habits.margin) * self.dt).clamp(min=0.0)
+        patience = torch.where(~calm & begun, patience, 0.0 * best)
+        switch = patience > self._crossing(before, other, target, reached).clamp(min=self.arm.habits.patience)
+        goal = torch.where(switch | ~begun, other, torch.where(calm, near, along))
+        patience = torch.where(switch, 0.0 * patience, patience)
+        going = (going | switch) & begun
+        straight = self.limits.project(goal, lower, upper, before)
+        # The elbow bends as the limbs want it while the other joints are on their way.
+        fixed = (torch.where(self.bends, lower, straight), torch.where(self.bends, upper, straight))
+        crossed, miss = self.descent(straight, target, *fixed, straight, hold, 0.0 * firm, going)
+        angles = torch.where(begun, torch.where(going, crossed, near), other)
+        left = (crossed - goal).abs().sum(dim=1, keepdim=True) > kernel.SAME
+        going = (going & left & (miss >= self.arm.habits.calm)).to(torch.float64)
+        return angles, torch.cat([angles, goal, patience, going, bend], dim=1)
 
-    def _candidates(self, upper: Tensor, fore: Tensor) -> list[tuple[Tensor, Tensor]]:
-        """The four solutions without regard to limits, and whether each is one rather than the nearest to one."""
-        w0, w1, w2, w3 = self.axes
+    def _crossing(self, start: Tensor, goal: Tensor, target: Tensor, staying: Tensor) -> Tensor:
+        """``kernel._crossing``."""
+        way, total = goal - start, 0.0 * target[:, :1]
+        for stop in range(kernel.WAY):
+            pose = start + (stop + 1.0) / (kernel.WAY + 1.0) * way
+            bent = torch.where(self.bends, start, pose)
+            misses = [miss_of(self.kinematics.limbs(each)[0], target) for each in (pose, bent)]
+            total = total + (torch.minimum(*misses) - staying).clamp(min=0.0)
+        longest = (way.abs() / self.speed).max(dim=1, keepdim=True)[0]
+        return longest * total / kernel.WAY
+
+    def _solve(self, target: Tensor, near: Tensor, wanted: Tensor) -> tuple[Tensor, Tensor]:
+        """``kernel.solve_arm`` for the rows that want it: angles and misses."""
+        closed = self._closed_form(target) if len(self.arm.closed) else []
+        seeds = [seed + 0.0 * target[:, :1] for seed in self.seeds]
+        count, rows = len(closed) + len(seeds), target.shape[0]
+        lower, upper = ((limit + 0.0 * target[:, :1]).repeat(count, 1) for limit in (self.lower, self.upper))
+        anchor = near.repeat(count, 1)
+        starts = self.limits.project(torch.cat([*closed, *seeds]), lower, upper, self.rest + 0.0 * anchor)
+        misses = miss_of(self.kinematics.limbs(starts)[0], target.repeat(count, 1)).reshape(count, -1)
+        starts = starts.reshape(count, -1, self.joints)
+        best, least, miss = starts[0], self._score(misses[0, :, None], starts[0], near), misses[0, :, None]
+        for index in range(1, count):
+            # Where the closed form has an answer the seeds are not asked.
+            asked = miss >= kernel.NEAR if index >= len(closed) else miss >= 0.0
+            score = self._score(misses[index, :, None], starts[index], near)
+            better = asked & (score < least)
+            best, least = torch.where(better, starts[index], best), torch.where(better, score, least)
+            miss = torch.where(better, misses[index, :, None], miss)
+        some = min(kernel.STARTS, count)
+        order = torch.topk(misses, some, dim=0, largest=False, sorted=True)[1]
+        chosen = torch.gather(starts, 0, order[:, :, None].repeat(1, 1, self.joints)).reshape(-1, self.joints)
+        active = (wanted & (miss >= kernel.NEAR)).repeat(some, 1)
+        box = [limit[: some * rows] for limit in (lower, upper, anchor)]
+        still = 0.0 * chosen[:, :1]
+        found, reached = self.descent(
+            chosen, target.repeat(some, 1), box[0], box[1], box[2], kernel.REST + still, still, active
+        )
+        found, reached = found.reshape(some, -1, self.joints), reached.reshape(some, -1, 1)
+        refined, least, value = found[0], self._score(reached[0], found[0], near), reached[0]
+        for index in range(1, some):
+            score = self._score(reached[index], found[index], near)
+            better = score < least
+            refined, least = torch.where(better, found[index], refined), torch.where(better, score, least)
+            value = torch.where(better, reached[index], value)
+        exact = miss < kernel.NEAR
+        return torch.where(exact, best, refined), torch.where(exact, miss, value)
+
+    def _score(self, miss: Tensor, angles: Tensor, near: Tensor) -> Tensor:
+        return miss + kernel.PULL * (angles - near).abs().sum(dim=1, keepdim=True)
+
+    def _closed_form(self, target: Tensor) -> list[Tensor]:
+        """The four solutions without regard to limits."""
         found = []
-        for first in (1.0, -1.0):
-            a0, a1, real_upper = _subproblem_two(w0, w1, self.zero[0], upper, first)
-            turned = _turned(w1, -a1, _turned(w0, -a0, fore))
-            for second in (1.0, -1.0):
-                a2, a3, real_fore = _subproblem_two(w2, w3, self.zero[1], turned, second)
-                by_joint = dict(zip(self.solver.movers, (a0, a1, a2, a3), strict=True))
+        for first in (-1.0, 1.0):
+            a0, a1 = _two_turns(self.turns[0], target[:, :3], first)
+            turned = _turned(self.turns[0, 1], -a1, _turned(self.turns[0, 0], -a0, target[:, 3:]))
+            for second in (-1.0, 1.0):
+                a2, a3 = _two_turns(self.turns[1], turned, second)
+                by_joint = dict(zip([int(joint) for joint in self.arm.closed], (a0, a1, a2, a3), strict=True))
+                middle = 0.5 * (self.lower + self.upper)
                 columns = [
-                    wrapped(by_joint[joint], self.middle[joint]) if joint in by_joint else self.rest[joint] + 0.0 * a0
+                    wrapped(by_joint[joint], middle[joint]) if joint in by_joint else self.rest[joint] + 0.0 * a0
                     for joint in range(self.joints)
                 ]
-                found.append((torch.cat(columns, dim=1), real_upper & real_fore))
+                found.append(torch.cat(columns, dim=1))
         return found
 
 
-class _Step(nn.Module):
-    """One projected Levenberg-Marquardt step of every row that is still active."""
-
-    def __init__(self, kinematics: ArmKinematics, clamp: Clamp) -> None:
-        super().__init__()
-        self.kinematics, self.clamp = kinematics, clamp
-        self.movers = list(kinematics.movers)
-        self.unit = torch.eye(len(self.movers), dtype=torch.float64)
-        joints = len(clamp.lower)
-        self.spread = torch.eye(joints, dtype=torch.float64)[self.movers]
-
-    def forward(
-        self,
-        angles: Tensor,
-        residual: Tensor,
-        columns: Tensor,
-        cost: Tensor,
-        damping: Tensor,
-        active: Tensor,
-        goal: Tensor,
-    ) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor]:
-        lower, upper = self.clamp.limits(angles)
-        slope = (residual[:, None] @ columns)[:, 0]
-        moving = angles[:, self.movers]
-        at_lower = (moving <= lower[..., self.movers] + 1e-12) & (slope > 0.0)
-        at_upper = (moving >= upper[..., self.movers] - 1e-12) & (slope < 0.0)
-        free = 1.0 - (at_lower | at_upper).to(torch.float64)
-        gradient = slope * free
-        alive = (active > 0.5) & (dot(gradient, gradient) >= FLAT)
-        local = columns * free[:, None]
-        step = self._solve(local.transpose(1, 2) @ local + damping[:, :, None] * self.unit, -gradient)
-        promised = -0.5 * dot(gradient, step)
-        trial = self.clamp(angles + step @ self.spread)
-        new_residual, new_columns = self.kinematics.jacobian(trial)
-        new_residual = new_residual - goal
-        new_cost = dot(new_residual, new_residual)
-        gain = cost - new_cost
-        alive = alive & ((gain > 1e-12) | (damping <= 10.0))
-        factor = torch.where(gain > promised.clamp(min=0.0), 0.2 + 0.0 * gain, 5.0 + 0.0 * gain)
-        damping = torch.where(alive, (damping * factor).clamp(1e-7, 1e2), damping)
-        taken = alive & (gain > 0.0)
-        return (
-            torch.where(taken, trial, angles),
-            torch.where(taken, new_residual, residual),
-            torch.where(taken[:, :, None], new_columns, columns),
-            torch.where(taken, new_cost, cost),
-            damping,
-            alive.to(torch.float64),
-        )
-
-    def _solve(self, matrix: Tensor, right: Tensor) -> Tensor:
-        """Solves positive definite systems ``(B, k, k)`` by Gauss-Jordan elimination, which needs no pivots there."""
-        whole = torch.cat([matrix, right[:, :, None]], dim=2)
-        for index in range(len(self.movers)):
-            row = whole[:, index : index + 1] / whole[:, index : index + 1, index : index + 1]
-            whole = whole - (whole[:, :, index : index + 1] - self.unit[index][None, :, None]) * row
-        return whole[:, :, -1]
-
-
-class _Loop(nn.Module):
-    """Repeats a step while any row is active; scripted, so that it becomes a loop of the graph."""
-
-    def __init__(self, step: Any, most: int) -> None:
-        super().__init__()
-        self.step = step
-        self.most = most
-
-    def forward(
-        self,
-        angles: Tensor,
-        residual: Tensor,
-        columns: Tensor,
-        cost: Tensor,
-        damping: Tensor,
-        active: Tensor,
-        goal: Tensor,
-    ) -> Tensor:
-        count = 0
-        going = bool(active.sum() > 0.5)
-        while going and count < self.most:
-            angles, residual, columns, cost, damping, active = self.step(
-                angles, residual, columns, cost, damping, active, goal
-            )
-            going = bool(active.sum() > 0.5)
-            count += 1
-        return angles
-
-
-def _loop(step: _Step, joints: int, movers: int) -> Any:
-    rows = 2
-    example = tuple(
-        torch.zeros(rows, *shape, dtype=torch.float64)
-        for shape in ((joints,), (6,), (6, movers), (1,), (1,), (1,), (6,))
-    )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # remarks of the tracer about constants, and of newer versions about its age
-        traced = torch.jit.trace(step, example, check_trace=False)  # type: ignore[no-untyped-call]
-        return torch.jit.script(_Loop(traced, STEPS))
-
-
-def _subproblem_two(
-    first: Tensor, second: Tensor, start: Tensor, goal: Tensor, sign: float
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Angles ``(..., 1)`` with R(first, a) R(second, b) start = goal ``(..., 3)``, and whether there is a solution."""
-    c = dot(first, second)
-    across = cross(first, second)
-    span = dot(across, across)
-    along_second = dot(second, start)
-    along_first = dot(goal, first)
-    alpha = (along_first - c * along_second) / span
-    beta = (along_second - c * along_first) / span
-    square = (1.0 - alpha * alpha - beta * beta - 2.0 * alpha * beta * c) / span
-    middle = alpha * first + beta * second + sign * torch.sqrt(square.clamp(min=0.0)) * across
-    return _angle_about(first, middle, goal), _angle_about(second, start + 0.0 * middle, middle), square >= 0.0
-
-
-def _angle_about(axis: Tensor, start: Tensor, goal: Tensor) -> Tensor:
-    """Angle ``(..., 1)`` about ``axis`` that turns ``start`` towards ``goal``."""
-    return angle_of(dot(cross(start, goal), axis), dot(start, goal) - dot(start, axis) * dot(goal, axis))
+def _two_turns(turn: Tensor, goal: Tensor, sign: float) -> tuple[Tensor, Tensor]:
+    """Angles ``(B, 1)`` about two axes that bring a direction onto ``goal`` ``(B, 3)``, as in ``kernel``."""
+    first, beside, across = turn[0], turn[2], turn[3]
+    cosine_, start, offset = turn[4, 0], turn[4, 1], turn[4, 2]
+    span = 1.0 - cosine_ * cosine_
+    along = dot(goal, first)
+    alpha, beta = (along - cosine_ * start) / span, (start - cosine_ * along) / span
+    square = (1.0 - alpha * alpha - beta * beta - 2.0 * alpha * beta * cosine_) / span
+    gamma, root = torch.sqrt((square * span).clamp(min=0.0)), torch.sqrt(span)
+    aim = angle_of(dot(goal, across), dot(goal, beside))
+    outer, inner = angle_of(gamma, beta * root), angle_of(gamma, alpha * root)
+    return aim + sign * outer, sign * inner - offset
 
 
 def _turned(axis: Tensor, angle: Tensor, vector: Tensor) -> Tensor:

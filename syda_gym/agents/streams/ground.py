@@ -105,16 +105,14 @@ class Ground:
     def _chunk(
         self, plays: list[int], rngs: list[np.random.Generator], drawn: list[Drawn | None]
     ) -> list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
-        """Base, age, reference and operator of some episodes; their frames are mapped together."""
+        """Base, age, reference and operator of some episodes."""
         seen, newest, firsts = [], [], []
         for clip, rng, values in zip(plays, rngs, drawn, strict=True):
             frames, packets, first = self._watch(clip, rng, values)
             seen.append(frames)
             newest.append(packets)
             firsts.append(first)
-        mapped = np.split(
-            self.repertoire.map(0, np.concatenate(seen)), np.cumsum([len(frames) for frames in seen])[:-1]
-        )
+        mapped = [self.repertoire.map(0, frames) for frames in seen]
         return [
             self._episode(clip, values, frames, base, packets, first)
             for clip, values, frames, base, packets, first in zip(

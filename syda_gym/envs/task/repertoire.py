@@ -107,7 +107,8 @@ class Repertoire:
     def mapped_rows(self, route: int) -> FloatArray:
         """What the mappings of a route make of each operator frame, ``(rows, n)`` [rad]; mapped on first use."""
         if route not in self._mapped:
-            self._mapped[route] = self.map(route, self.operator_rows)
+            parts = [self.map(route, self.operator_rows[clip.rows]) for clip in self.clips]
+            self._mapped[route] = np.concatenate(parts)
         return self._mapped[route]
 
     def target_rows(self, freeze: float = 0.0) -> FloatArray:
@@ -122,14 +123,18 @@ class Repertoire:
         return self._targets[freeze]
 
     def map(self, route: int, frames: FloatArray) -> FloatArray:
-        """Operator frames ``(N, F)`` to joint angles ``(N, n)`` [rad] along a route, within the joint limits."""
+        """Operator frames ``(N, F)`` of one clip at the control rate to joint angles ``(N, n)`` [rad] along a route.
+
+        Frames are taken in time order (``Mapping.follow``): within the joint limits, and those joints that follow limbs
+        within their speeds.
+        """
         mapping = self.pilot.mapping(self.routes[route].bodies)
         if mapping.window:
             raise MappingError(
                 f"{mapping!r} looks at {mapping.window} past frames; the environment maps single frames: fit without "
                 "window, or use mapping.stream.FrameStream in a loop of your own"
             )
-        return self.robot.clamp(mapping(frames))
+        return self.robot.clamp(mapping.follow(frames, mapping.begin(), 1.0 / self._control_hz)[0])
 
     def limited(self, commands: FloatArray) -> FloatArray:
         """Commands at the control rate, ``(N, n)`` or ``(B, N, n)`` [rad], within the joint speed limits."""

@@ -14,8 +14,8 @@ import numpy as np
 
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray, Side
 from syda_gym.embodiments.human import HumanSkeleton
-from syda_gym.embodiments.kinematics.arm_chain import ArmChain
-from syda_gym.embodiments.limb_ik.solver import LimbIK
+from syda_gym.embodiments.limb_ik.arm import moving_joints
+from syda_gym.embodiments.limb_ik.solver import LimbIK, LimbState
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MappingError
 from syda_gym.mappings.coding.coders import Arrays, Coder
@@ -30,7 +30,8 @@ PLACED_WIDTH = 15
 
 _MIRROR = np.array([1.0, -1.0, 1.0])
 _SHORTEST = 1e-6  # m
-_DOWN = (0.0, 0.0, -1.0)
+Vector = tuple[float, float, float]
+_DOWN: Vector = (0.0, 0.0, -1.0)
 _HANGING = (_DOWN, _DOWN)
 """Upper arm and forearm of an arm that nothing tells about."""
 
@@ -171,7 +172,8 @@ class HumanArmCoder(Coder):
 class RobotArmCoder(Coder):
     """A robot's arm as its two unit limb directions, then the angles of joints that move neither elbow nor wrist.
 
-    Directions are decoded by closed-form inverse kinematics within the joint limits; a wrist yaw passes as it is.
+    Directions are decoded by ``LimbIK`` within the joint limits: ``decode`` takes each frame for itself, ``follow``
+    takes them in time order. A wrist yaw passes as it is.
 
     Args:
         body: a robot.
@@ -228,32 +230,62 @@ class RobotArmCoder(Coder):
         return np.concatenate([limbs, frames[:, self.extra_columns] * self.extra_signs], axis=-1)
 
     def decode(self, codes: FloatArray) -> FloatArray:
-        """Joint angles ``(N, n)`` within the limits."""
+        """Joint angles ``(N, n)`` within the limits, each frame for itself."""
         if len(codes) == 1:
             return self.decode_one(codes[0].tolist())[None]
-        limbs = codes[..., :6].reshape(*codes.shape[:2], 2, 3)
-        # A vanishing direction (a model that knows nothing) becomes a hanging arm rather than a division by zero.
-        limbs = np.where(np.sum(limbs**2, axis=-1, keepdims=True) < 1e-12, [0.0, 0.0, -1.0], limbs)
-        wanted = np.zeros((len(codes), len(self.robot.sides), 2, 3))
-        wanted[:, :, :, 2] = -1.0
-        wanted[:, self._arms] = limbs * self._signs[:, None]
-        solved = self._ik.solve(wanted)
-        frames = np.repeat(self.rest[None], len(codes), axis=0)
-        for arm in self._arms:
-            part = self.robot.arm_slices[arm]
-            frames[:, part] = solved[:, part]
-        frames[:, self.extra_columns] = codes[..., 6:] * self.extra_signs
-        return self.robot.clamp(frames)
+        return self._completed(self._ik.solve(self._wanted(codes)), codes)
 
     def decode_one(self, codes: list[list[float]]) -> FloatArray:
         """The same for one frame ``(n,)`` from finite codes ``(arms, 6 + extras)``; live use decodes frame by frame."""
-        wanted = [_HANGING] * len(self.robot.sides)
+        return self._completed_one(self._ik.solve(np.array([self._wanted_one(codes)]))[0].tolist(), codes)
+
+    def begin(self) -> Any:
+        """The state of the limb solver before a clip, a ``LimbState``."""
+        return self._ik.begin()
+
+    def follow(self, codes: FloatArray, memory: Any, dt: float | None, limited: bool) -> tuple[FloatArray, Any]:
+        """Joint angles ``(N, n)`` within the limits of frames in time order, see ``LimbIK.follow``."""
+        if len(codes) == 1:
+            frame, memory = self.follow_one(codes[0].tolist(), memory, dt, limited)
+            return frame[None], memory
+        frames, memory = self._ik.follow(self._wanted(codes)[None], memory, dt, limited=limited)
+        return self._completed(frames[0], codes), memory
+
+    def follow_one(
+        self, codes: list[list[float]], memory: LimbState, dt: float | None, limited: bool
+    ) -> tuple[FloatArray, LimbState]:
+        """The same for one frame ``(n,)`` from finite codes ``(arms, 6 + extras)``."""
+        frames, memory = self._ik.follow(np.array([[self._wanted_one(codes)]]), memory, dt, limited=limited)
+        return self._completed_one(frames[0, 0].tolist(), codes), memory
+
+    def _wanted(self, codes: FloatArray) -> FloatArray:
+        """Limb directions ``(N, arms, 2, 3)`` of all arms in the torso frame."""
+        limbs = codes[..., :6].reshape(*codes.shape[:2], 2, 3)
+        # A vanishing direction (a model that knows nothing) becomes a hanging arm rather than a division by zero.
+        limbs = np.where(np.sum(limbs**2, axis=-1, keepdims=True) < _SHORTEST**2, _DOWN, limbs)
+        wanted = np.zeros((len(codes), len(self.robot.sides), 2, 3))
+        wanted[:, :, :, 2] = -1.0
+        wanted[:, self._arms] = limbs * self._signs[:, None]
+        return wanted
+
+    def _completed(self, frames: FloatArray, codes: FloatArray) -> FloatArray:
+        """Solved frames with the arms that are not coded at rest, and the joints that the code holds as they are."""
+        for column, angle in self._resting:
+            frames[:, column] = angle
+        frames[:, self.extra_columns] = codes[..., 6:] * self.extra_signs
+        return self.robot.clamp(frames)
+
+    def _wanted_one(self, codes: list[list[float]]) -> list[tuple[Vector, Vector]]:
+        """``_wanted`` for one frame in plain floats."""
+        wanted: list[tuple[Vector, Vector]] = [_HANGING] * len(self.robot.sides)
         for arm, sign, (ux, uy, uz, fx, fy, fz, *_) in zip(self._arms, self._lateral, codes, strict=True):
-            n, m = math.sqrt(ux * ux + uy * uy + uz * uz), math.sqrt(fx * fx + fy * fy + fz * fz)
-            upper = (ux / n, uy * sign / n, uz / n) if n >= _SHORTEST else _DOWN
-            fore = (fx / m, fy * sign / m, fz / m) if m >= _SHORTEST else _DOWN
+            upper = (ux, uy * sign, uz) if ux * ux + uy * uy + uz * uz >= _SHORTEST**2 else _DOWN
+            fore = (fx, fy * sign, fz) if fx * fx + fy * fy + fz * fz >= _SHORTEST**2 else _DOWN
             wanted[arm] = (upper, fore)
-        frame = self._ik.solve_frame(wanted)
+        return wanted
+
+    def _completed_one(self, frame: list[float], codes: list[list[float]]) -> FloatArray:
+        """``_completed`` for one frame in plain floats."""
         for column, angle in self._resting:
             frame[column] = angle
         for arm, index, column, sign in self._extra_places:
@@ -274,7 +306,7 @@ class RobotArmCoder(Coder):
             [
                 self.robot.arm_slices[arm].start + joint
                 for joint in range(self.robot.chains[arm].n_joints)
-                if joint not in _movers(self.robot.chains[arm])
+                if joint not in moving_joints(self.robot.chains[arm])
             ]
             for arm in self._arms
         ]
@@ -309,14 +341,6 @@ def shared_arms(source: Embodiment, target: Embodiment) -> tuple[tuple[Side, ...
     """
     common = tuple(side for side in source.sides if side in target.sides)
     return (common, common) if common else (source.sides[:1], target.sides[:1])
-
-
-def _movers(chain: ArmChain) -> list[int]:
-    """The joints that ``LimbIK`` uses: the first four that move elbow or wrist against the shoulder."""
-    probe = np.random.default_rng(0).uniform(chain.lower, chain.upper, (16, chain.n_joints))
-    jacobian = chain.jacobians(probe)[1]
-    moving = np.abs(jacobian[:, 1:3] - jacobian[:, :1]).max(axis=(0, 1, 2)) > 1e-6
-    return [int(joint) for joint in np.flatnonzero(moving)][:4]
 
 
 def _facing_forward(points: FloatArray) -> FloatArray:

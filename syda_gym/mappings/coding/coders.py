@@ -66,6 +66,18 @@ class Coder(ABC):
     def decode(self, codes: FloatArray) -> FloatArray:
         """Frames ``(N, F)`` of codes ``(N, K, D)``."""
 
+    def begin(self) -> Any:
+        """What ``follow`` remembers before the first frame of a clip; ``None`` for a coder that remembers nothing."""
+        return None
+
+    def follow(self, codes: FloatArray, memory: Any, dt: float | None, limited: bool) -> tuple[FloatArray, Any]:
+        """Frames ``(N, F)`` of codes ``(N, K, D)`` in time order, ``dt`` seconds apart, and the memory after them.
+
+        A coder that remembers nothing decodes each for itself. ``memory`` is a value that no call changes, and
+        ``limited`` says whether joint speeds hold.
+        """
+        return self.decode(codes), memory
+
     def arrays(self) -> Arrays:
         """Fitted numbers, for storage."""
         return {}

@@ -54,6 +54,14 @@ class MinkArmCoder(RobotArmCoder):
         self._constraints = [mink.DofFreezingTask(self._model, frozen)] if frozen else []
         self._limits = [mink.ConfigurationLimit(self._model)]
 
+    def begin(self) -> Any:
+        """Nothing: mink remembers frames within one call of ``decode`` only."""
+        return None
+
+    def follow(self, codes: FloatArray, memory: Any, dt: float | None, limited: bool) -> tuple[FloatArray, Any]:
+        """``decode``, which is warm-started from frame to frame anyhow."""
+        return self.decode(codes), None
+
     def decode(self, codes: FloatArray) -> FloatArray:
         """Joint angles ``(N, n)``."""
         goals = self._goals(codes)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import Counter
 from collections.abc import Callable
 from typing import NamedTuple
 
+from syda_gym.teleoperation.incoming import clock as live_clock
 from syda_gym.teleoperation.incoming.packets import Packet
 
 __all__ = ["Inbox", "Received"]
 
 _MAX_REQUESTS = 64
+_HALTING = ("stop", "pause")
 
 
 class Received(NamedTuple):
@@ -33,13 +36,17 @@ class Inbox:
 
     Args:
         rouse: called after a request or the end came, to wake a source that waits for something else than the inbox.
+        clock: tells when a request from this side came.
 
     Attributes:
+        halted: when the last stop or pause came [s], whoever asked; minus infinity before.
         dropped: how many packets were dropped, by reason; a frame that a newer one replaced counts as ``overtaken``.
     """
 
-    def __init__(self, rouse: Callable[[], None] | None = None) -> None:
+    def __init__(self, rouse: Callable[[], None] | None = None, clock: Callable[[], float] = live_clock.clock) -> None:
         self._rouse = rouse
+        self._clock = clock
+        self.halted = -math.inf
         self.dropped: Counter[str] = Counter()
         self._lock = threading.Lock()
         self._condition = threading.Condition(self._lock)
@@ -54,7 +61,7 @@ class Inbox:
         """Delivers a packet that arrived at ``arrived`` [s]."""
         with self._condition:
             if packet.control is not None:
-                self._request(packet.control)
+                self._request(packet.control, arrived)
             if packet.frame is not None:
                 if self._packet is not None:
                     self.dropped["overtaken"] += 1
@@ -64,7 +71,7 @@ class Inbox:
     def request(self, control: str) -> None:
         """Delivers a request that comes from this side, for example from the keyboard."""
         with self._condition:
-            self._request(control)
+            self._request(control, self._clock())
             self._condition.notify()
         if self._rouse is not None:
             self._rouse()
@@ -105,6 +112,11 @@ class Inbox:
         if self._rouse is not None:
             self._rouse()
 
+    def reopen(self) -> None:
+        """Something may come again: requests, while a robot goes home after the end."""
+        with self._condition:
+            self._closed = False
+
     @property
     def filled(self) -> bool:
         """Whether there is something to take."""
@@ -115,10 +127,14 @@ class Inbox:
         """Whether no more packets will come."""
         return self._closed
 
-    def _request(self, control: str) -> None:
+    def _request(self, control: str, now: float) -> None:
+        if control in _HALTING:
+            self.halted = max(self.halted, now)
+        if self._controls and self._controls[-1] == control:  # once more is the same
+            return
         if len(self._controls) < _MAX_REQUESTS:
             self._controls.append(control)
-        elif control == "stop":  # an emergency stop always has room
-            self._controls[-1] = control
+        elif control in _HALTING:  # these always have room, and nothing that stands behind them lifts them
+            self._controls[-1] = "stop" if "stop" in (control, self._controls[-1]) else control
         else:
             self.dropped["requests"] += 1

@@ -75,6 +75,8 @@ class BulletSink(Sink):
         self._pictures: queue.Queue[NDArray[np.uint8] | None] = queue.Queue(_PICTURES)
         self._writer: threading.Thread | None = None
         self._failure: Exception | None = None
+        self._news: list[str] = []
+        self._blind = False
         self._frame: Callable[[], FloatArray | None] = lambda: None
 
     def accompany(self, frame: Callable[[], FloatArray | None]) -> None:
@@ -128,13 +130,18 @@ class BulletSink(Sink):
         """Takes over the command; after an emergency stop none until it is released.
 
         Raises:
-            TeleoperationError: the simulation or the video has failed.
+            TeleoperationError: the simulation has failed.
         """
         if self._failure is not None:
             raise TeleoperationError(f"the simulated robot failed: {self._failure}") from self._failure
         if decision.state is State.STOPPED:
             return
         self._command = decision.command  # without the lock, for the loop must not wait for physics
+
+    def news(self) -> list[str]:
+        """Whether the film failed."""
+        news, self._news = self._news, []
+        return news
 
     def stop(self) -> None:
         """Holds the pose that the simulated robot has now."""
@@ -179,8 +186,15 @@ class BulletSink(Sink):
             self._failure = error
 
     def _show(self, command: FloatArray, pose: FloatArray, steps: int) -> None:
-        if self._eye is None:
+        if self._eye is None or self._blind:
             return
+        try:
+            self._draw(command, pose, steps)
+        except Exception as error:  # a closed window must not end the robot
+            self._blind = True
+            self._news.append(f"pictures dropped: {error}")
+
+    def _draw(self, command: FloatArray, pose: FloatArray, steps: int) -> None:
         n = self.robot.n_features
         angles = pose[:n]
         errors = np.linalg.norm(pose[n:].reshape(-1, 3) - self.robot.landmarks(command)[0], axis=-1)
@@ -204,7 +218,7 @@ class BulletSink(Sink):
         if self.video is not None:
             try:
                 write_video(self.video, pictures(), float(self.rates.control_hz))
-            except Exception as error:  # told to the loop by the next send
-                self._failure = error
+            except Exception as error:  # the robot goes on without its film
+                self._news.append(f"film dropped: {error}")
                 while self._pictures.get() is not None:
                     pass  # the simulation must not wait for a reader that is gone

@@ -56,6 +56,7 @@ class NaoqiSink(Sink):
         self._condition = threading.Condition()
         self._next: list[float] | None = None
         self._ending = False
+        self._stops = 0
         self._failure: Exception | None = None
 
     def open(self) -> None:
@@ -116,11 +117,27 @@ class NaoqiSink(Sink):
             self._condition.notify()
 
     def stop(self) -> None:
-        """Kills every motion of the robot; commands queued before are dropped."""
+        """Kills every motion of the robot; commands queued before are dropped.
+
+        The call is made at once, without waiting for the network, and again by the thread if a command was on its way
+        meanwhile, so that the last word that the robot hears is the stop.
+
+        Raises:
+            TeleoperationError: the robot cannot be told.
+        """
         with self._condition:
             self._next = None
-        if self._motion is not None:
-            self._motion.killAll()
+            self._stops += 1
+            self._condition.notify()
+        if self._motion is None:
+            return
+        try:
+            self._kill()
+        except Exception as error:
+            raise TeleoperationError(f"the robot at {self.url} does not take the stop: {error}") from error
+
+    def _kill(self) -> None:
+        self._motion.killAll(_async=True)
 
     def close(self) -> None:
         """Ends the thread and the connection; the arms stay stiff where they are."""
@@ -153,10 +170,13 @@ class NaoqiSink(Sink):
                 while self._next is None and not self._ending:
                     self._condition.wait()
                 angles, self._next = self._next, None
+                stops = self._stops
             if angles is None:
                 return
             try:
                 self._motion.setAngles(self._names, angles, self.speed)
+                if self._stops != stops:  # a stop came while the command was on its way
+                    self._kill()
             except Exception as error:  # qi raises RuntimeError for most, and others on a lost connection
                 self._failure = error
                 return

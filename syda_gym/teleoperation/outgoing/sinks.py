@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import socket
 from abc import ABC, abstractmethod
@@ -9,12 +10,15 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
+from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, TeleoperationError
-from syda_gym.teleoperation.incoming.sources import require_token
+from syda_gym.teleoperation.incoming.network import require_token
 from syda_gym.teleoperation.tick import Decision
 
 __all__ = ["ManySinks", "MemorySink", "Sink", "UdpSink"]
+
+_GONE = 15  # packets in a row that could not be sent
 
 
 class Sink(ABC):
@@ -30,6 +34,18 @@ class Sink(ABC):
     @abstractmethod
     def send(self, decision: Decision) -> None:
         """Sends one command."""
+
+    def angles(self) -> FloatArray | None:
+        """The robot's joint angles now ``(n,)`` [rad]; ``None`` from a sink that cannot tell.
+
+        Raises:
+            TeleoperationError: the robot should tell and does not.
+        """
+        return None
+
+    def news(self) -> list[str]:
+        """What a person should know and has not been told yet, such as a film that could not be written."""
+        return []
 
     def rehearse(self) -> None:  # noqa: B027 - most sinks only hand over
         """Does what ``send`` does short of sending, so that the next command goes out faster."""
@@ -64,14 +80,19 @@ class MemorySink(Sink):
 
 
 class ManySinks(Sink):
-    """Sends to several sinks in turn.
+    """Sends to several sinks in turn; one that fails is left out with a line, and the others go on.
 
     Args:
         sinks: all for the same robot.
+
+    Attributes:
+        lost: sinks that failed.
     """
 
     def __init__(self, sinks: Sequence[Sink]) -> None:
         self.sinks = tuple(sinks)
+        self.lost: tuple[Sink, ...] = ()
+        self._news: list[str] = []
 
     def open(self) -> None:
         """Opens all, or none."""
@@ -86,9 +107,45 @@ class ManySinks(Sink):
             raise
 
     def send(self, decision: Decision) -> None:
-        """Sends to each."""
+        """Sends to each.
+
+        Raises:
+            TeleoperationError: the last of them failed.
+        """
+        failed: list[tuple[Sink, Exception]] = []
         for sink in self.sinks:
-            sink.send(decision)
+            try:
+                sink.send(decision)
+            except Exception as error:  # the others must be commanded all the same
+                failed.append((sink, error))
+        for sink, reason in failed:
+            self._lose(sink, reason)
+
+    def angles(self) -> FloatArray | None:
+        """Where the robot is by the first sink that can tell.
+
+        Raises:
+            TeleoperationError: those that should tell do not.
+        """
+        errors = []
+        for sink in self.sinks:
+            try:
+                angles = sink.angles()
+            except Exception as error:
+                errors.append(error)
+                continue
+            if angles is not None:
+                return angles
+        if errors:
+            raise errors[0]
+        return None
+
+    def news(self) -> list[str]:
+        """The news of each, and which of them failed."""
+        news, self._news = self._news, []
+        for sink in self.sinks:
+            news += sink.news()
+        return news
 
     def rehearse(self) -> None:
         """Rehearses with each."""
@@ -96,9 +153,9 @@ class ManySinks(Sink):
             sink.rehearse()
 
     def stop(self) -> None:
-        """Stops each, even if one fails."""
+        """Stops each, those that failed too, even if one fails."""
         errors = []
-        for sink in self.sinks:
+        for sink in (*self.sinks, *self.lost):
             try:
                 sink.stop()
             except Exception as error:  # the others must stop all the same
@@ -107,9 +164,24 @@ class ManySinks(Sink):
             raise errors[0]
 
     def close(self) -> None:
-        """Closes each."""
-        for sink in self.sinks:
-            sink.close()
+        """Closes each, even if one fails."""
+        errors = []
+        for sink in (*self.sinks, *self.lost):
+            try:
+                sink.close()
+            except Exception as error:
+                errors.append(error)
+        if errors:
+            raise errors[0]
+
+    def _lose(self, sink: Sink, error: Exception) -> None:
+        if len(self.sinks) == 1:
+            raise TeleoperationError(f"no sink takes commands any more: {error}") from error
+        self.sinks = tuple(one for one in self.sinks if one is not sink)
+        self.lost = (*self.lost, sink)
+        self._news.append(f"{type(sink).__name__} GONE: {error}; the others go on")
+        with contextlib.suppress(Exception):  # it may hear a stop, if nothing else
+            sink.stop()
 
 
 class UdpSink(Sink):
@@ -137,6 +209,8 @@ class UdpSink(Sink):
         self.host = host
         self.port = port
         self.unsent = 0
+        self._failed = 0
+        self._news: list[str] = []
         self._template = _template(robot, token)
         self._sequence = 0
         self._latest: Decision | None = None
@@ -168,8 +242,17 @@ class UdpSink(Sink):
         self._latest = decision
         try:
             self._socket.sendto(data, self._address)
-        except OSError:
+            self._failed = 0
+        except OSError as error:
             self.unsent += 1
+            self._failed += 1
+            if self._failed == _GONE:
+                self._news.append(f"nothing gets through to udp {self.host}:{self.port}: {error.strerror or error}")
+
+    def news(self) -> list[str]:
+        """Whether packets stopped getting out."""
+        news, self._news = self._news, []
+        return news
 
     def rehearse(self) -> None:
         """Writes the last packet again and keeps it."""

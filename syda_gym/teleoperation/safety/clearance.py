@@ -59,6 +59,17 @@ class Clearance:
         self._stale = self._stale or bool(found)
         return found
 
+    def within(self, pose: FloatArray, distance: float) -> list[int]:
+        """Indices of the pairs that may be nearer than ``distance`` [m] at ``pose`` ``(n,)`` [rad].
+
+        All of them before the first measurement.
+        """
+        if self._pose is None:
+            return list(range(len(self._weights)))
+        nearest = self._room + (self._margin + _SLACK) - self._weights @ np.abs(pose - self._pose)
+        found: list[int] = (nearest < distance).nonzero()[0].tolist()
+        return found
+
 
 def _weights(robot: Robot, model: Any, shapes: Any) -> FloatArray:
     """How far a pair can come nearer for each joint's turn ``(pairs, n)`` [m/rad]."""

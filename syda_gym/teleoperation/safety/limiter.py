@@ -80,6 +80,19 @@ class CommandLimiter:
                 result = before
         return np.array(result)
 
+    def couple(self, previous: FloatArray, wanted: FloatArray, slack: FloatArray) -> FloatArray:
+        """``wanted`` ``(n,)`` [rad] with coupled limits kept.
+
+        Args:
+            previous: the last command ``(n,)`` [rad], within all limits.
+            wanted: the next one, within the plain limits.
+            slack: how far each joint may move ``(n,)`` [rad].
+        """
+        before, result = previous.tolist(), wanted.tolist()
+        for row in self._coupled:
+            row.apply(before, result, float(slack[row.joint]))
+        return np.array(result)
+
     def allows(self, angles: FloatArray) -> bool:
         """Whether ``angles`` ``(n,)`` [rad] lie within all limits."""
         inside = bool(((angles >= self.lower) & (angles <= self.upper)).all())

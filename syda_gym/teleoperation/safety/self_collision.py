@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -15,10 +16,12 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
 from syda_gym.teleoperation.safety.clearance import Clearance
 
-__all__ = ["SelfCollision"]
+__all__ = ["RESERVE", "SelfCollision"]
+
+RESERVE = 1e-3
+"""Further distance [m] that is kept where a way is foreseen rather than known, such as that of braking."""
 
 _SAMPLES = 256
-_SMALL = 1e-3  # rad
 _STEP = 0.1  # rad; how far apart the tested poses of a way may be
 _FEW = 24  # pairs; looking at more of them one by one takes as long as looking at all
 _LARGE = 500  # vertices of a mesh
@@ -64,10 +67,10 @@ class SelfCollision:
         except (ValueError, RuntimeError) as error:  # meshes that are missing or broken
             self.why = f"self-collision is not checked: {str(error).splitlines()[0]}"
         else:
-            self._index, self._turns = _indices(self._model, robot)
+            self._index, self._turns, self._columns = _indices(self._model, robot)
             self._configuration = np.zeros(self._model.nq)
             self._choose_pairs(samples)
-            self._clearance = Clearance(robot, self._model, self._shapes, margin)
+            self._clearance = Clearance(robot, self._model, self._shapes, margin + RESERVE)
             self.pairs = len(self._shapes.collisionPairs)
             if not self.pairs:
                 self.why = f"self-collision is not checked: {robot.urdf.name} has no collision shapes on two links"
@@ -118,41 +121,73 @@ class SelfCollision:
         """Whether the straight way from ``start`` (known to be free) to ``end`` is free, tested every 0.1 rad."""
         return not self.available or self._is_free(start, end, self._clearance.suspects(start, end))
 
-    def allowed(self, start: FloatArray, end: FloatArray) -> FloatArray:
-        """The part of a step that stays free: all of it, or arm by arm and joint by joint what can still move.
+    def suspects(self, *poses: FloatArray) -> list[int] | None:
+        """Pairs that may touch somewhere in the box of joint angles that ``poses`` span; ``None`` if all may."""
+        return self._clearance.suspects(*poses) if self.available else []
 
-        So an arm that meets the body slides along it rather than sticking to it.
+    def free(self, poses: Sequence[FloatArray], suspects: list[int] | None, reserve: bool = False) -> bool:
+        """Whether none of the suspected pairs touches at any pose ``(n,)`` [rad]; the last one is tried first.
 
         Args:
-            start: the last command ``(n,)`` [rad], free.
-            end: the next command ``(n,)`` [rad].
+            poses: to look at.
+            suspects: indices of pairs; all if ``None``.
+            reserve: asks for ``RESERVE`` more than the margin.
+        """
+        if suspects == []:
+            return True
+        return not any(self._touches(pose, suspects, reserve) for pose in reversed(poses))
+
+    def overlaps(self, angles: FloatArray) -> dict[int, float]:
+        """Pairs nearer than the margin at ``angles`` ``(n,)`` [rad], and how near [m]."""
+        if not self.available:
+            return {}
+        everything = self._model, self._data, self._shapes, self._shape_data, self._full(angles)
+        self._pin.updateGeometryPlacements(*everything)
+        found = {}
+        for pair in self._clearance.suspects(angles) or range(self.pairs):
+            distance = float(self._pin.computeDistance(self._shapes, self._shape_data, pair).min_distance)
+            if distance < self.margin:
+                found[pair] = distance
+        return found
+
+    def near(self, angles: FloatArray, within: float) -> tuple[FloatArray, FloatArray]:
+        """Distances of near pairs and how they change with the joint angles.
+
+        Args:
+            angles: ``(n,)`` [rad].
+            within: pairs further apart are left out [m].
 
         Returns:
-            ``end`` itself, or a new array between ``start`` and ``end``.
+            Distances ``(pairs,)`` [m], negative where shapes overlap, and gradients ``(pairs, n)`` [m/rad].
         """
-        if not self.available:
-            return end
-        suspects = self._clearance.suspects(start, end)
-        if self._is_free(start, end, suspects):
-            return end
-        result = start.copy()
-        for part in self.robot.arm_slices:
-            if self._try(result, end, part, suspects):
-                continue
-            for joint in range(part.start, part.stop):
-                self._try(result, end, slice(joint, joint + 1), suspects)
-        return result
-
-    def _try(self, pose: FloatArray, end: FloatArray, part: slice, suspects: list[int] | None) -> bool:
-        """Moves part of a pose to ``end`` if the way is free; steps too small to matter are not worth a check."""
-        if float(np.abs(end[part] - pose[part]).max()) < _SMALL:
-            return True
-        moved = pose.copy()
-        moved[part] = end[part]
-        if not self._is_free(pose, moved, suspects):
-            return False
-        pose[part] = end[part]
-        return True
+        pin, model, data = self._pin, self._model, self._data
+        configuration = self._full(angles)
+        pin.computeJointJacobians(model, data, configuration)
+        pin.updateGeometryPlacements(model, data, self._shapes, self._shape_data)
+        look, shapes, shape_data = pin.computeDistance, self._shapes, self._shape_data
+        distances, normals, pairs, first, second = [], [], [], [], []
+        for pair in self._clearance.within(angles, within):
+            result = look(shapes, shape_data, pair)
+            distance = result.min_distance
+            if distance < within:
+                distances.append(distance)
+                normals.append(result.normal)  # from the first shape to the second
+                first.append(result.getNearestPoint1())
+                second.append(result.getNearestPoint2())
+                pairs.append(pair)
+        gradients = np.zeros((len(pairs), len(angles)))
+        if not pairs:
+            return np.zeros(0), gradients
+        away = np.array(normals)
+        for points, side, sign in ((np.array(first), 0, -1.0), (np.array(second), 1, 1.0)):
+            joints = self._carriers[pairs, side]
+            for joint in set(joints.tolist()) - {0}:
+                rows = joints == joint
+                jacobian = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)[:, self._columns]
+                lever = _cross(points[rows] - data.oMi[joint].translation, away[rows])
+                gradients[rows] += sign * (away[rows] @ jacobian[:3] + lever @ jacobian[3:])
+        usable = np.isfinite(gradients).all(axis=1)
+        return np.array(distances)[usable], gradients[usable]
 
     def _is_free(self, start: FloatArray, end: FloatArray, suspects: list[int] | None) -> bool:
         """As ``free_path``, looking at the suspected pairs only, at all if there is no telling."""
@@ -164,15 +199,16 @@ class SelfCollision:
         count = math.ceil(farthest / _STEP)
         return not any(self._touches(start + (end - start) * (i / count), suspects) for i in range(count, 0, -1))
 
-    def _touches(self, angles: FloatArray, suspects: list[int] | None) -> bool:
-        everything = self._model, self._data, self._shapes, self._shape_data, self._full(angles)
+    def _touches(self, angles: FloatArray, suspects: list[int] | None, reserve: bool = False) -> bool:
+        shape_data = self._reserved if reserve else self._shape_data
+        everything = self._model, self._data, self._shapes, shape_data, self._full(angles)
         if suspects is None or len(suspects) > _FEW:
             return bool(self._pin.computeCollisions(*everything, True))
         if not suspects:
             return False
         self._pin.updateGeometryPlacements(*everything)
         look = self._pin.computeCollision
-        return any(look(self._shapes, self._shape_data, pair) for pair in suspects)
+        return any(look(self._shapes, shape_data, pair) for pair in suspects)
 
     def _full(self, angles: FloatArray) -> FloatArray:
         self._configuration[self._index] = angles
@@ -258,10 +294,20 @@ class SelfCollision:
         for index in range(len(pairs)) if order is None else order:
             if chosen[index]:
                 self._shapes.addCollisionPair(self._pin.CollisionPair(*pairs[index]))
+        carriers = [shape.parentJoint for shape in self._shapes.geometryObjects]
+        kept = [(carriers[pair.first], carriers[pair.second]) for pair in self._shapes.collisionPairs]
+        self._carriers = np.array(kept, dtype=np.int64).reshape(-1, 2)  # the joints that carry the shapes of each pair
         self._data = self._pin.Data(self._model)
         self._shape_data = self._pin.GeometryData(self._shapes)
-        for request in self._shape_data.collisionRequests:
-            request.security_margin = self.margin
+        self._reserved = self._pin.GeometryData(self._shapes)
+        for shape_data, margin in ((self._shape_data, self.margin), (self._reserved, self.margin + RESERVE)):
+            for request in shape_data.collisionRequests:
+                request.security_margin = margin
+            with warnings.catch_warnings():  # the attribute is going to be renamed, and its successor does nothing yet
+                warnings.simplefilter("ignore", DeprecationWarning)
+                for request in (*shape_data.collisionRequests, *shape_data.distanceRequests):
+                    # A search that begins where the last one ended has last bits that depend on what was asked before.
+                    request.enable_cached_gjk_guess = False
 
 
 def _arm_model(robot: Robot) -> tuple[Any, Any]:
@@ -351,13 +397,22 @@ def _hull(mesh: Any) -> Any:
     return coal.ConvexBase.convexHull(vertices, True, "Qt")
 
 
-def _indices(model: Any, robot: Robot) -> tuple[list[int], list[tuple[int, int]]]:
-    """Where each arm joint's angle goes in pinocchio's configuration, and which joints are continuous."""
-    index, turns = [], []
+def _indices(model: Any, robot: Robot) -> tuple[list[int], list[tuple[int, int]], list[int]]:
+    """Where each arm joint's angle goes in pinocchio's configuration, continuous joints, and columns of Jacobians."""
+    index, turns, columns = [], [], []
     names = read_urdf(robot.urdf).model_joints
     for column, name in enumerate(robot.joint_names):
         joint = model.joints[model.getJointId(names[name])]
         index.append(joint.idx_q)
+        columns.append(joint.idx_v)
         if joint.nq == 2:
             turns.append((column, joint.idx_q))
-    return index, turns
+    return index, turns, columns
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products of rows ``(N, 3)``; numpy's own takes several times as long."""
+    result = np.empty_like(a)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        result[:, i] = a[:, j] * b[:, k] - a[:, k] * b[:, j]
+    return result

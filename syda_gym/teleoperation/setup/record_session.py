@@ -137,8 +137,8 @@ class _Stage:
         self.operator = operator
         self.calibration: Calibration | None = None
         self._limiter = CommandLimiter(robot)
-        ask = getattr(sink, "angles", None)
-        self._command = self._limiter.start(robot.rest if ask is None else ask())
+        where = sink.angles()
+        self._command = self._limiter.start(robot.rest if where is None else where)
         self._last = source.clock()
 
     def calibrate(self) -> None:

@@ -22,7 +22,8 @@ from syda_gym.simulation.page.plan import BodyPlan, Button, PagePlan, PlotPlan, 
 from syda_gym.simulation.page.process import PageProcess
 from syda_gym.simulation.pictures.stage import OPERATOR_AT
 from syda_gym.teleoperation.incoming.camera import PictureSource
-from syda_gym.teleoperation.incoming.sources import Source, require_token
+from syda_gym.teleoperation.incoming.network import require_token
+from syda_gym.teleoperation.incoming.sources import Source
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.outgoing.sinks import ManySinks, Sink

@@ -14,6 +14,7 @@ from syda_gym.errors import AgentError
 from syda_gym.files import asset
 from syda_gym.mappings.fitting.fit import fit
 from syda_gym.mappings.storage import load_mapping
+from syda_gym.mappings.stream import FrameStream
 from syda_gym.motions.synthetic.generator import generate
 
 KINDS = {
@@ -37,9 +38,19 @@ def motions():
 
 
 def worst(mapping, frames) -> float:
-    """Largest difference between graph and mapping; live frames come one by one."""
-    expected = np.stack([mapping(frame) for frame in frames])
-    return float(np.abs(MappingGraph(mapping)(torch.as_tensor(frames)).numpy() - expected).max())
+    """Largest difference between graph and mapping, over sequences of ten frames that the graph takes side by side."""
+    clips = frames.reshape(-1, 10, frames.shape[1])
+    expected = []
+    for clip in clips:
+        stream = FrameStream(mapping, 10.0)
+        expected.append([stream(frame) for frame in clip])
+    graph = MappingGraph(mapping, 0.1)
+    state, found = torch.zeros(len(clips), graph.state_size, dtype=torch.float64), []
+    for index in range(10):
+        fresh = torch.full((len(clips), 1), float(index == 0), dtype=torch.float64)
+        mapped, state = graph(torch.as_tensor(clips[:, index]), state, fresh)
+        found.append(mapped.numpy())
+    return float(np.abs(np.stack(found, axis=1) - np.array(expected)).max())
 
 
 def odd(frames, count=40, size=0.05):
@@ -82,7 +93,7 @@ def test_what_has_no_graph_says_which_have(motions):
 
     mapping.regressor.__class__ = Strange
     with pytest.raises(AgentError, match=r"'strange' model.*ridge, kernel_ridge"):
-        MappingGraph(mapping)
+        MappingGraph(mapping, 0.1)
 
     class Other(type(mapping.target_coder)):
         kind = "other"
@@ -90,7 +101,7 @@ def test_what_has_no_graph_says_which_have(motions):
     mapping.target_coder.__class__ = Other
     mapping.regressor.__class__ = Strange.__bases__[0]
     with pytest.raises(AgentError, match=r"code 'other' of 'pepper'.*quaternions, human_arms"):
-        MappingGraph(mapping)
+        MappingGraph(mapping, 0.1)
 
 
 def test_angles_are_exact_everywhere():

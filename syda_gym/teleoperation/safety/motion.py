@@ -1,0 +1,371 @@
+"""Motion: from where the robot is towards a target, so that it can always stop before it would do harm."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.teleoperation.safety.detour import Detour
+from syda_gym.teleoperation.safety.limiter import CommandLimiter
+from syda_gym.teleoperation.safety.pace import Pace, braking_speed
+from syda_gym.teleoperation.safety.self_collision import SelfCollision
+from syda_gym.teleoperation.safety.slide import slide
+
+__all__ = ["Motion", "Moved"]
+
+_LOOK = 0.1  # rad; how far apart the looked-at poses of a way to a standstill are
+_STANDING = 1e-9  # rad/s
+_DAMPING = 8.0  # 1/s; share of a pair's distance by which it may shrink in a second
+_NEAR = 0.08  # m; pairs further apart do not take part in sliding
+_SAME_GOAL = 0.2  # rad; a target that moves less is the same one, with noise
+_PROGRESS = 0.02  # rad
+_PATIENCE = 0.3  # s without progress after which a held back robot looks for another way
+_AGAIN = 1.0  # s until it looks once more
+_ARRIVED = 0.03  # rad; nearer than that, no detour is worth it
+_CORNER = 0.15  # rad between two remembered poses
+_CORNERS = 60
+
+
+class Moved(NamedTuple):
+    """What a step did: whether the robot was held back by its own body, and whether it is on a detour."""
+
+    held_back: bool = False
+    detour: bool = False
+
+
+class Motion:
+    """Moves a robot's command towards targets within every limit that it has.
+
+    Joint limits, coupled limits, joint speeds and accelerations (and jerks, if wanted) hold, and no pair of links comes
+    nearer than the margin. A step is taken only if the robot could come to a standstill after it within the same limits
+    and without touching itself; the way to that standstill is what remains if nothing better is found in the next step.
+
+    A step that would touch slides along the body; where that ends in a corner although the target is free, a detour of
+    straight lines is looked for and followed.
+
+    Args:
+        limiter: position, coupled and speed limits.
+        collision: what must not touch; ``None`` if nothing is checked.
+        period: of the loop [s].
+        acceleration: greatest ``(n,)`` [rad/s^2].
+        jerk: greatest ``(n,)`` [rad/s^3]; ``None`` if there is no limit.
+        start: where the robot is ``(n,)`` [rad].
+    """
+
+    def __init__(
+        self,
+        limiter: CommandLimiter,
+        collision: SelfCollision | None,
+        period: float,
+        acceleration: FloatArray,
+        jerk: FloatArray | None,
+        start: FloatArray,
+    ) -> None:
+        self.command = limiter.start(start)
+        self._limiter = limiter
+        self._collision = collision if collision is not None and collision.available else None
+        self._most = acceleration * (1.0 - 1e-9)
+        self._jerk = jerk
+        self._pace = Pace(period, len(start))
+        self._now = 0.0
+        self._target: FloatArray | None = None  # of the step before
+        self._drift = np.zeros(len(start))  # the target's velocity
+        self._last_drift = np.zeros(len(start))
+        self._step = np.zeros(len(start))  # from the last command to this one
+        self._goal: FloatArray | None = None
+        self._best = math.inf
+        self._best_at = 0.0
+        self._was_held = False
+        self._search: Detour | None = None
+        self._searching = False
+        self._next_search = 0.0
+        self._way: list[FloatArray] = []
+        self._way_goal = self.command
+        self._in_line = False  # whether the way to a standstill that is known to be free is a straight line
+        self._trail: deque[FloatArray] = deque(maxlen=_CORNERS)
+        self._overlaps: dict[int, float] = {}
+        self.place(self.command)
+
+    @property
+    def standing(self) -> bool:
+        """Whether the robot stands still by its commands."""
+        return float(np.abs(self._pace.velocity).max()) < _STANDING
+
+    def place(self, pose: FloatArray) -> None:
+        """The robot is at ``pose`` ``(n,)`` [rad] and does not move."""
+        self.command = self._limiter.start(pose)
+        self._pace.rest()
+        self._forget()
+        self._trail.clear()
+        self._overlaps = {} if self._collision is None else self._collision.overlaps(self.command)
+
+    def begin(self, now: float, left: float | None, leaving: float | None = None) -> None:
+        """A step begins at ``now`` [s]; the last command left between ``leaving`` and ``left`` [s], if known."""
+        self._now = now
+        self._pace.begin(now, left, leaving)
+
+    def freeze(self) -> None:
+        """Stands still at once, whatever the acceleration: an emergency stop."""
+        self._pace.rest()
+        self._pace.end(self._now, np.zeros(len(self.command)))
+        self._forget()
+
+    def brake(self) -> None:
+        """Comes to a standstill as fast as the acceleration allows, on a way that is known to be free."""
+        self._forget()
+        if not self._pace.idle:
+            self._go(self._braked())
+        self._pace.end(self._now, np.zeros(len(self.command)) if self._pace.idle else self._step)
+
+    def follow(self, target: FloatArray, factor: float) -> Moved:
+        """Moves towards ``target`` ``(n,)`` [rad] at ``factor`` of the speed limits at most."""
+        if self._pace.idle:
+            self._pace.end(self._now, np.zeros(len(self.command)))
+            return Moved()
+        self._watch(target)
+        moved = self._detour(factor) if self._way or self._searching else None
+        if moved is None:
+            moved = self._straight(target, factor)
+        self._was_held = self._was_held or moved.held_back
+        self._pace.end(self._now, self._step)
+        self._remember()
+        return moved
+
+    def twin(self) -> Motion:
+        """A copy whose steps change nothing of this one; it does not look for detours."""
+        twin = copy.copy(self)
+        twin._pace, twin._trail = copy.copy(self._pace), self._trail.copy()
+        twin._search, twin._searching, twin._next_search, twin._way = None, False, math.inf, list(self._way)
+        return twin
+
+    def _straight(self, target: FloatArray, factor: float) -> Moved:
+        low, high = self._window(factor)
+        wanted = np.clip(self._wanted(target), low, high)
+        if not wanted.any():
+            self._step = np.zeros(len(target))
+            return Moved()
+        if self._try(wanted):
+            return Moved()
+        coupled = np.clip(self._coupled(wanted, low, high), low, high)
+        if coupled.any() and self._try(coupled):
+            return Moved()
+        braked = self._braked()
+        if self._collision is not None:
+            slid = self._slide(wanted, low, high)
+            if slid is not None and self._try(slid):
+                return Moved(True)
+            if slid is not None and self._try(0.5 * (slid + braked)):
+                return Moved(True)
+        for share in (0.5, 0.2):
+            if self._try(braked + share * (coupled - braked)):
+                return Moved(True)
+        self._go(braked)
+        return Moved(True)
+
+    def _wanted(self, target: FloatArray) -> FloatArray:
+        """The velocity that arrives at the target as soon as possible and does not overshoot it."""
+        pace, way = self._pace, target - self.command
+        lag = pace.dt if self._jerk is None else pace.dt + 0.5 * self._most / self._jerk
+        reach = braking_speed(np.abs(way - self._drift * pace.dt), self._most, lag)
+        wanted = np.clip(way / pace.dt, self._drift - reach, self._drift + reach)
+        below = braking_speed(np.maximum(self.command - self._limiter.lower, 0.0), self._most, pace.dt)
+        above = braking_speed(np.maximum(self._limiter.upper - self.command, 0.0), self._most, pace.dt)
+        return np.clip(wanted, -below, above)
+
+    def _window(self, factor: float) -> tuple[FloatArray, FloatArray]:
+        """Velocities that speed, acceleration and jerk permit ``(n,)`` [rad/s]."""
+        pace = self._pace
+        change = self._most * pace.change
+        low, high = pace.velocity - change, pace.velocity + change
+        slowest, fastest = low, high  # to come down from a speed that has become too high counts more
+        if self._jerk is not None:
+            swing = self._jerk * pace.change
+            low = np.maximum(low, np.minimum(pace.velocity + (pace.acceleration - swing) * pace.change, high))
+            high = np.minimum(high, np.maximum(pace.velocity + (pace.acceleration + swing) * pace.change, low))
+        cap = min(max(factor, 0.0), 1.0) * self._limiter.speed * (1.0 - 1e-9)
+        high = np.maximum(np.minimum(high, cap), slowest)
+        low = np.minimum(np.maximum(low, -cap), fastest)
+        return np.minimum(low, high), np.maximum(low, high)
+
+    def _braked(self) -> FloatArray:
+        """The velocity of the first step to a standstill."""
+        velocity, change = self._pace.velocity, self._pace.change
+        if self._in_line:
+            longest = float((np.abs(velocity) / self._most).max())
+            return velocity * max(0.0, 1.0 - change / longest) if longest > 0.0 else velocity
+        slower: FloatArray = np.sign(velocity) * np.maximum(np.abs(velocity) - self._most * change, 0.0)
+        return slower
+
+    def _try(self, velocity: FloatArray) -> bool:
+        """Takes a step if it and the way to a standstill after it are within limits and free."""
+        end = self._end(velocity)
+        poses = self._standstill(end, velocity)
+        if not (self._limiter.allows(end) and all(map(self._limiter.allows, poses))):
+            return False
+        if self._collision is not None and not self._free(end, poses):
+            return False
+        self._go(velocity)
+        self._in_line = False
+        return True
+
+    def _standstill(self, start: FloatArray, velocity: FloatArray) -> list[FloatArray]:
+        """Poses on the way from ``start`` to a standstill, each joint braking for itself."""
+        speed = np.abs(velocity)
+        takes = speed / self._most
+        count = math.ceil(float((0.5 * speed * takes).max()) / _LOOK)
+        longest, poses = float(takes.max()), []
+        for index in range(1, count + 1):
+            time = np.minimum(takes, longest * index / count)
+            pose = start + np.sign(velocity) * time * (speed - 0.5 * self._most * time)
+            poses.append(np.minimum(np.maximum(pose, self._limiter.lower), self._limiter.upper))
+        return poses
+
+    def _free(self, end: FloatArray, after: list[FloatArray]) -> bool:
+        check = self._collision
+        assert check is not None  # the caller looked; for the type checker
+        suspects = check.suspects(self.command, end, *after[-1:])
+        if suspects == []:
+            return True
+        if self._overlaps:
+            return self._comes_apart(end)
+        if check.free([end, *after], suspects, reserve=True):
+            return True
+        # Where the robot stands nearer than the reserve already, the margin alone counts.
+        if check.free([self.command], suspects, reserve=True):
+            return False
+        return check.free([end, *after], suspects)
+
+    def _comes_apart(self, end: FloatArray) -> bool:
+        """For a robot that was put where it touches: whether nothing comes nearer and nothing else touches."""
+        assert self._collision is not None
+        now = self._collision.overlaps(end)
+        return all(pair in self._overlaps and now[pair] >= self._overlaps[pair] - 1e-6 for pair in now)
+
+    def _slide(self, wanted: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray | None:
+        check = self._collision
+        assert check is not None
+        distances, gradients = check.near(self.command, _NEAR)
+        if not len(distances):
+            return None
+        left = distances - check.margin - 1.5e-3
+        damping = min(_DAMPING, 0.5 / self._pace.dt)
+        slowest = -damping * np.maximum(left, 0.0)
+        inside = left < 0.0
+        slowest[inside] = np.minimum(-damping * left[inside], 0.05)  # what is too near comes apart
+        return slide(wanted, low, high, gradients, slowest)
+
+    def _coupled(self, velocity: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+        """The velocity, changed so that limits that depend on other joints hold."""
+        slack = np.maximum(np.abs(low), np.abs(high)) * self._pace.dt
+        return (self._limiter.couple(self.command, self._end(velocity), slack) - self.command) / self._pace.dt
+
+    def _end(self, velocity: FloatArray) -> FloatArray:
+        end = self.command + velocity * self._pace.dt
+        return np.minimum(np.maximum(end, self._limiter.lower), self._limiter.upper)
+
+    def _go(self, velocity: FloatArray) -> None:
+        end = self._end(velocity)
+        if not self._limiter.allows(end):  # rounding at the edge of a coupled limit
+            end = self.command
+        self._step = end - self.command
+        self.command = end
+        if self._overlaps and self._step.any():
+            assert self._collision is not None
+            self._overlaps = self._collision.overlaps(end)
+
+    def _watch(self, target: FloatArray) -> None:
+        """Notices how the target moves, and when the robot gets no nearer to it."""
+        if self._target is not None and self._pace.dt > 0.0:
+            drift = (target - self._target) / self._pace.dt
+            # What moved once may have jumped; a velocity is what two steps have in common.
+            before = self._last_drift
+            self._drift = np.where(
+                drift * before > 0.0, np.sign(drift) * np.minimum(np.abs(drift), np.abs(before)), 0.0
+            )
+            self._drift = np.clip(self._drift, -self._limiter.speed, self._limiter.speed)
+            self._last_drift = drift
+        else:
+            self._drift = self._last_drift = np.zeros(len(target))
+        self._target = target
+        if self._goal is None or float(np.abs(target - self._goal).max()) > _SAME_GOAL:
+            self._goal, self._best, self._search, self._next_search = target, math.inf, None, self._now
+            self._searching = False
+            self._trail.append(self.command)
+        if self._way and float(np.abs(target - self._way_goal).max()) > _SAME_GOAL:
+            self._way = []
+        distance = float(np.abs(target - self.command).max())
+        if distance < self._best - _PROGRESS or distance < _ARRIVED:
+            self._best, self._best_at, self._was_held = min(distance, self._best), self._now, False
+        elif self._was_held and self._now - self._best_at > _PATIENCE and self._now >= self._next_search:
+            self._searching = self._collision is not None and not self._way
+
+    def _detour(self, factor: float) -> Moved | None:
+        """Looks for a way while standing still, or follows it; ``None`` if there is nothing of the kind to do."""
+        if self._searching:
+            self._look()
+            return Moved(True, True)
+        while self._way and float(np.abs(self._way[0] - self.command).max()) < 1e-9:
+            self._way.pop(0)
+        if not self._way:
+            return None
+        return self._along(self._way[0], factor)
+
+    def _look(self) -> None:
+        """Comes to a standstill and looks for a way from there."""
+        self._go(self._braked())
+        if not self.standing or self._step.any():
+            return
+        assert self._collision is not None
+        assert self._goal is not None
+        if self._search is None:
+            rest = self._limiter.robot.rest
+            self._search = Detour(self._limiter, self._collision, self.command, self._goal, rest, self._trail)
+        self._search.work()
+        if self._search.over:
+            self._way, self._way_goal = list(self._search.found or ()), self._search.goal
+            self._search, self._searching = None, False
+            self._next_search = self._now + _AGAIN
+            self._best_at = self._now
+
+    def _along(self, corner: FloatArray, factor: float) -> Moved | None:
+        """One step along a straight line, all joints together."""
+        way = corner - self.command
+        length = float(np.abs(way).max())
+        unit = way / length
+        low, high = self._window(factor)
+        moving = np.abs(unit) > 1e-12
+        ends = np.stack([low[moving] / unit[moving], high[moving] / unit[moving]])
+        slow, fast = float(ends.min(axis=0).max()), float(ends.max(axis=0).min())
+        most = float((self._most[moving] / np.abs(unit[moving])).min())
+        wanted = min(float(braking_speed(np.array(length), np.array(most), self._pace.dt)), length / self._pace.dt)
+        speed = min(max(wanted, slow), fast)
+        velocity = unit * speed
+        end = corner if speed * self._pace.dt >= length * (1.0 - 1e-12) else self._end(velocity)
+        off = self._pace.velocity - unit * float(self._pace.velocity @ unit / (unit @ unit))
+        free = self._collision is None or self._collision.free([end], self._collision.suspects(self.command, end))
+        if slow > fast or float(np.abs(off).max()) > 1e-6 or not free or not self._limiter.allows(end):
+            self._go(self._braked())
+            if self.standing:
+                self._way = []
+            return Moved(True, True)
+        self._step = end - self.command
+        self.command = end
+        self._in_line = True
+        return Moved(False, True)
+
+    def _remember(self) -> None:
+        if self._collision is None or self._way:
+            return
+        if not self._trail or float(np.abs(self.command - self._trail[-1]).max()) > _CORNER:
+            self._trail.append(self.command)
+
+    def _forget(self) -> None:
+        """The target is not the last one any more."""
+        self._target = self._goal = self._search = None
+        self._way, self._best, self._was_held, self._searching = [], math.inf, False, False
+        self._next_search = self._now

@@ -1,0 +1,110 @@
+"""Pace: how fast the robot really moves, told by when its commands left, and how much faster or slower it may get."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from syda_gym.embodiments.embodiment import FloatArray
+
+__all__ = ["Pace", "braking_speed"]
+
+_TINY = 1e-6  # s; commands this close together count as one
+_STALL = 2.0  # periods without a command after which the robot stands still
+
+
+class Pace:
+    """Keeps the velocity of a stream of commands whose intervals are never quite even.
+
+    What a robot feels is how far its commands are apart when they *arrive*. A busy machine sends one late and the next
+    on time, and what was a slow step by the loop's own clock is a fast one on the wire. So velocities here are
+    differences of commands over the time between their sendings, and a step may last as long as has passed since the
+    last command had left: the interval on the wire is never shorter. The velocity of an interval counts for its middle;
+    two of them are half of both intervals apart, which is the time in which it may change.
+
+    Args:
+        period: of the loop [s].
+        joints: number of joints.
+
+    Attributes:
+        velocity: of the last command ``(n,)`` [rad/s].
+        acceleration: of the last command ``(n,)`` [rad/s^2].
+        dt: how long the next step may last [s].
+        change: how much time the velocity has to change [s].
+    """
+
+    def __init__(self, period: float, joints: int) -> None:
+        self._period = period
+        self.velocity = np.zeros(joints)
+        self.acceleration = np.zeros(joints)
+        self.dt = 0.0
+        self.change = 0.0
+        self._step = np.zeros(joints)  # the last command less the one before
+        self._planned = np.zeros(joints)
+        self._before: float | None = None  # when the command before the last one had left
+        self._first: float | None = None  # when it left at the earliest
+        self._last: float | None = None  # when the last one had left
+        self._last_first = 0.0
+
+    def begin(self, now: float, left: float | None, leaving: float | None = None) -> None:
+        """A command is to be found at ``now`` [s].
+
+        Args:
+            now: the loop's clock.
+            left: when the last command had left, at the latest, on the same clock; if not known, when it was decided.
+            leaving: when it left at the earliest; if not known, at ``left``.
+        """
+        if self._last is None:
+            self.dt = self.change = 0.0
+            return
+        last = self._last if left is None else min(max(left, self._last), now)
+        first = last if leaving is None else min(max(leaving, self._last), last)
+        passed = now - last
+        self.dt = min(passed, 1.5 * self._period)
+        if passed > _STALL * self._period:  # nothing came for so long that the robot has come to rest
+            self.velocity = np.zeros_like(self.velocity)
+            self.acceleration = np.zeros_like(self.velocity)
+            self.change = self.dt
+        else:
+            # Without a history, as if the robot had stood still for a period.
+            longest = self._period if self._first is None else last - self._first
+            shortest = self._period if self._before is None else first - self._before
+            # The slower of what it may have been: getting faster is what harms.
+            self.velocity = self._step / longest if longest > _TINY else self._planned
+            self.change = 0.5 * (max(shortest, 0.0) + self.dt)
+        self._last, self._last_first = last, first
+
+    @property
+    def idle(self) -> bool:
+        """Whether no time has passed in which to move."""
+        return self.dt <= _TINY
+
+    def end(self, now: float, step: FloatArray) -> None:
+        """The command was found: the last one plus ``step`` ``(n,)`` [rad]."""
+        if self._last is None:
+            self._last = self._last_first = now
+            return
+        if self.idle:  # one command sent twice
+            return
+        planned = step / self.dt
+        self.acceleration = (planned - self.velocity) / max(self.change, _TINY)
+        self._before, self._first = self._last, self._last_first
+        self._last = self._last_first = now
+        self._step, self._planned = step, planned
+
+    def rest(self) -> None:
+        """The robot has been stopped, or put somewhere: it does not move."""
+        self.velocity = np.zeros_like(self.velocity)
+        self.acceleration = np.zeros_like(self.velocity)
+        self._step, self._planned = np.zeros_like(self.velocity), np.zeros_like(self.velocity)
+
+
+def braking_speed(distance: FloatArray, most: FloatArray, delay: float | FloatArray) -> FloatArray:
+    """The speed ``(n,)`` [rad/s] from which a joint can still stop within a distance.
+
+    Args:
+        distance: ``(n,)`` [rad], not negative.
+        most: deceleration ``(n,)`` [rad/s^2].
+        delay: time that passes before the braking begins [s].
+    """
+    result: FloatArray = most * (np.sqrt(delay * delay + 2.0 * distance / most) - delay)
+    return result
