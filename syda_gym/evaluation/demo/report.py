@@ -214,8 +214,8 @@ def _regions(result: DemoResult) -> Picture:
 
     operator = result.cast.operator
     bodies = result.motions.bodies[operator], result.robot
-    png, dark = (clouds_png(*bodies, samples=2**18, dark=dark) for dark in (False, True))
-    narrow, narrow_dark = (clouds_png(*bodies, samples=2**18, width=3.5, dark=dark) for dark in (False, True))
+    png, dark = (clouds_png(*bodies, dark=dark) for dark in (False, True))
+    narrow, narrow_dark = (clouds_png(*bodies, width=3.5, dark=dark) for dark in (False, True))
     variants = {"dark": dark, "narrow": narrow, "narrow-dark": narrow_dark}
     return Picture(f"Where {result.robot.name} can move as {operator} does", png, variants=variants)
 

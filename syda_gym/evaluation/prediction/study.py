@@ -19,9 +19,10 @@ from syda_gym.evaluation.prediction.scores import score_predictors
 from syda_gym.evaluation.prediction.trial import BedFrames, Progress, fit_all, held_out_errors
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
+from syda_gym.routes.general import Sampling
 from syda_gym.routes.measured import fit_options, measured_bodies
 from syda_gym.routes.metric import Transferability, transferability
-from syda_gym.routes.noise import alpha_from_noise, high_frequency_noise
+from syda_gym.routes.noise import alpha_from_noise, sensor_noise
 
 __all__ = ["motion_noise", "validate"]
 
@@ -37,7 +38,7 @@ def validate(
     folds: int = 4,
     fps: float = 5.0,
     max_hops: int = 3,
-    samples: int = 2**18,
+    samples: int = Sampling.samples,
     seed: int = 0,
     resamples: int = 1000,
     progress: Progress | None = None,
@@ -104,12 +105,7 @@ def motion_noise(motions: Motions, names: Sequence[str] | None = None) -> dict[s
     Returns:
         Body to noise, to be given to ``transferability.noise.alpha_from_noise``.
     """
-    found = {}
-    for name in names or motions.bodies:
-        body = motions.bodies[name]
-        clips = [body.landmarks(clip.frames) for clip in motions.clips(name) if len(clip) > 3]
-        found[name] = high_frequency_noise(clips) / body.reach
-    return found
+    return {name: noise / motions.bodies[name].reach for name, noise in sensor_noise(motions, names).items()}
 
 
 def _links(bodies: dict[str, Embodiment], samples: int, seed: int) -> dict[str, dict[tuple[str, str], Transferability]]:
