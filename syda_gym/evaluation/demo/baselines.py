@@ -38,9 +38,9 @@ class MeanPose(Mapping):
     @property
     def card(self) -> MappingCard:
         """Says ``mean pose``."""
-        features = ([f"{one.name} [{one.unit}]" for one in body.features] for body in (self.source, self.target))
+        given, wanted = ([f"{one.name} [{one.unit}]" for one in body.features] for body in (self.source, self.target))
         return MappingCard(
-            "mean pose", "none", 0, self.source.spec(), self.target.spec(), *features, versions=versions()
+            "mean pose", "none", 0, self.source.spec(), self.target.spec(), given, wanted, versions=versions()
         )
 
     def raw(self, frames: FloatArray) -> FloatArray:

@@ -75,7 +75,8 @@ class _Played:
         before = np.minimum(at.astype(int), len(path) - 2)
         weight = (at - before)[:, None, None]
         mixed: FloatArray = path[before] * (1.0 - weight) + path[before + 1] * weight
-        return mixed / np.maximum(np.linalg.norm(mixed, axis=-1, keepdims=True), 1e-9)
+        unit: FloatArray = mixed / np.maximum(np.linalg.norm(mixed, axis=-1, keepdims=True), 1e-9)
+        return unit
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,7 +37,8 @@ def bed_figures(
     """
     by_job = dict(zip(jobs, results, strict=True))
     sessions = [by_job[job] for job in jobs if job.kind == "session"]
-    routes = [tuple(text.split(">")) for text in sessions[0]["errors"]]
+    # Sorted, because a piece that is read again has its keys in another order than one that was just computed.
+    routes = sorted((tuple(text.split(">")) for text in sessions[0]["errors"]), key=lambda route: (len(route), route))
     errors = np.array([[session["errors"][">".join(route)] for route in routes] for session in sessions])
     predictions = _predictions(by_job, sessions, routes)
     table = _Table(routes, errors, resamples, settings.seed)
@@ -135,7 +136,7 @@ class _Table:
     def ceiling(self) -> dict[str, float]:
         """Agreement of sessions (reliability), its root (what a perfect predictor has), and the same of the average."""
         count = len(self.errors)
-        found = {}
+        found: dict[str, float] = {}
         chosen = [group[self.hops[group] > 1] for group in self.groups]
         couples = [(i, j) for i in range(count) for j in range(i)]
         for what, rows in (("pairs", self.hops == 1), ("chains", self.hops > 1)):
@@ -224,7 +225,7 @@ def _predictions(
 
 
 def _measured(training: Mapping[str, float], routes: Sequence[Names]) -> FloatArray:
-    errors = {(a, b): value for (a, b), value in ((tuple(t.split(">")), v) for t, v in training.items())}
+    errors = {(a, b): value for (a, b), value in ((tuple(t.split(">")), v) for t, v in sorted(training.items()))}
     bodies = measured_bodies(errors)
     return np.array([-bodies.error(route) for route in routes])
 
