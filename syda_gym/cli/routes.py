@@ -105,7 +105,7 @@ def route(
         ),
     ] = None,
     count: CountOption = 5,
-    noise: Annotated[bool, typer.Option("--noise", help="Take alpha from the noise of the recordings.")] = False,
+    noise: Annotated[bool, typer.Option("--noise", help="Take the noise of sensors from the recordings.")] = False,
     suggest: Annotated[bool, typer.Option("--suggest", help="Also say which pair to record next.")] = False,
     picture: PictureOption = None,
     as_json: JsonOption = False,
@@ -123,20 +123,22 @@ def route(
     source, target = ends_of(operator, robot)
     fitted, bodies = _fitted_pairs(pairs_of(pairs), motions)
     options: dict[str, Any] = {"predictor": predictor}
-    if predictor in (None, "dry_run") and kind in (None, "dry_run") and not noise:
+    if predictor in (None, "dry_run") and kind in (None, "dry_run"):
         options |= _plan_of(motions, sensor)
-    if predictor == "measured":
-        from syda_gym.evaluation.prediction.study import measure_bodies
-
-        named = [(getattr(a, "name", a), getattr(b, "name", b)) for a, b in fitted]
-        with stages({"fit": "Fitting pairs to measure bodies"}) as tell:
-            options["predictor"] = measure_bodies(motions, named, progress=tell)
-    if noise:
+        if noise:
+            options["sensor"] = {**_seen_noise(motions, fitted), **(options["sensor"] or {})}
+    elif noise:
         from syda_gym.evaluation.prediction.study import motion_noise
         from syda_gym.motions.loading import load_motions
         from syda_gym.routes.noise import alpha_from_noise
 
         options["alpha"] = alpha_from_noise(motion_noise(load_motions(motions)))
+    if predictor == "measured":
+        from syda_gym.routes.measured import measure_bodies
+
+        named = [(getattr(a, "name", a), getattr(b, "name", b)) for a, b in fitted]
+        with stages({"fit": "Fitting pairs to measure bodies"}) as tell:
+            options["predictor"] = measure_bodies(motions, named, progress=tell)
     known = {getattr(body, "name", body) for pair in fitted for body in pair}
     for name in (source, target):
         if name not in known:
@@ -168,6 +170,16 @@ def route(
 def _plan_of(motions: str, sensor: list[str] | None) -> dict[str, Any]:
     """Options of the dry run: the user's motions beside those that come along, and the noise of sensors."""
     return {"motions": None if motions == "embedded" else motions, "sensor": sensors_of(sensor)}
+
+
+def _seen_noise(motions: str, fitted: list[tuple[Any, Any]]) -> dict[str, float]:
+    """What the recordings say about the sensors of the bodies in question [m]."""
+    from syda_gym.motions.loading import load_motions
+    from syda_gym.routes.noise import sensor_noise
+
+    recorded = load_motions(motions)
+    names = dict.fromkeys(getattr(body, "name", body) for pair in fitted for body in pair)
+    return sensor_noise(recorded, [name for name in names if name in recorded.bodies])
 
 
 def _fitted_pairs(pairs: list[tuple[str, str]], motions: str) -> tuple[list[tuple[Any, Any]], list[Any]]:

@@ -26,13 +26,14 @@ def demo(
     seed: SeedOption = 0,
     residual: Annotated[bool, typer.Option(help="Train the short residual policy.")] = True,
 ) -> None:
-    """Run everything once: fit the pairs, rank and play every chain, train a residual, write a report."""
-    from syda_gym.evaluation.demo.report import chain_table, transferability_table
+    """Run everything once: whom to pair a new operator with, asked before any fit and checked after."""
+    from syda_gym.evaluation.demo.report import chain_table
     from syda_gym.evaluation.demo.run import run_demo
+    from syda_gym.evaluation.demo.story import dry_run_table, next_steps, shows
 
     words = {
         "load": "Loading motions",
-        "transferability": "Measuring transferability",
+        "transferability": "Asking the dry run",
         "fit": "Fitting mappings",
         "play": "Playing chains as episodes",
         "residual": "Training the residual policy",
@@ -45,13 +46,14 @@ def demo(
         result = run_demo(
             motions, out, robot=robot, seed=seed, residual=residual, command=typed_command(), progress=tell
         )
-    print_table(transferability_table(result))
-    for operator, route in result.chosen.items():
-        ties = "".join(f"; {' > '.join(other.bodies)} lies within sampling noise" for other in route.ties)
-        console().print(f"Route chosen for [bold]{operator}[/]: [bold]{' > '.join(route.bodies)}[/]{ties}")
+    print_table(dry_run_table(result))
     print_table(chain_table(result))
     if result.residual:
         print_table(result.residual.table())
+    for title, lines in (("What this shows", shows(result)), ("What to do next with your robot", next_steps(result))):
+        console().print(f"\n[bold]{title}[/]")
+        for line in lines:
+            console().print(f"- {line}", highlight=False)
     say_written("\nReport", result.report or out, "(open it in a browser)")
 
 

@@ -368,7 +368,7 @@ class Fleet:
                     f"got {wish.frame}"
                 )
             frame = wish.frame
-        route = 0
+        route = self.repertoire.clip_routes[clip]
         if wish.route is not None:
             route = wish.route
         elif self.options.route == "sample":

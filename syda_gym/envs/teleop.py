@@ -168,7 +168,8 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     |---|---|---|
     | ``operator`` | ``"adult"`` | who leads: a body of the motions |
     | ``robot`` | ``"pepper"`` | who follows: ``pepper``, ``nao`` or any registered robot |
-    | ``route`` | ``"auto"`` | ``auto`` (best by transferability), ``sample`` (drawn by it), or names of bodies |
+    | ``route`` | ``"auto"`` | ``auto`` (best), ``sample`` (drawn by T), ``per_motion`` (best for each clip), or names |
+    | ``predictor`` | ``"dry_run"`` | ranks routes: ``dry_run``, ``measured`` (once fitted), ``T``, ``hops`` ... |
     | ``mapping`` | ``"syda"`` | a method of ``syda_gym.mappings.METHODS``, a ``Mapping``, or a folder of fitted ones |
     | ``preset`` | ``None`` | preset of the method; its default if ``None`` |
     | ``motions`` | ``"embedded"`` | synthetic default, ``"paper:DIR"``, any spec of ``load_motions``, or ``Motions`` |

@@ -11,19 +11,34 @@ by least squares over the fitted pairs, and a chain is predicted by its ends plu
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
+from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.errors import OptionError, RouteError, nearest_name
+from syda_gym.mappings.fitting.fit import fit_many
+from syda_gym.motions.clip import Motions
+from syda_gym.motions.loading import load_motions
 from syda_gym.routes.metric import Transferability
 
-__all__ = ["MeasuredBodies", "measured_bodies"]
+__all__ = [
+    "MOST_TRAINING_FRAMES",
+    "MeasuredBodies",
+    "fit_options",
+    "landmark_gap",
+    "measure_bodies",
+    "measured_bodies",
+]
 
 _BETWEEN = 0.05  # share that a body between adds, from the validation study
 _RIDGE = 1e-3
+_LAG_SECONDS = 0.2
+MOST_TRAINING_FRAMES = 400
+"""Rows of a pair on which a training error is taken; more of them move nothing."""
 
 
 @dataclass(frozen=True)
@@ -89,3 +104,63 @@ def measured_bodies(errors: Mapping[tuple[str, str], float]) -> MeasuredBodies:
     return MeasuredBodies(
         dict(zip(names, found[:count].tolist(), strict=True)), dict(zip(names, found[count:].tolist(), strict=True))
     )
+
+
+def measure_bodies(
+    motions: str | Motions,
+    pairs: Sequence[tuple[str, str]] | None = None,
+    *,
+    method: str = "syda",
+    preset: str | None = None,
+    fps: float = 5.0,
+    seed: int = 0,
+    progress: Callable[[str, float], None] | None = None,
+) -> MeasuredBodies:
+    """Fits pairs and turns their training errors into a predictor for routing.
+
+    Args:
+        motions: recordings.
+        pairs: which to fit; all that were recorded together by default.
+        method: how pairs are fitted.
+        preset: of the method.
+        fps: frames per second that are kept.
+        seed: of the fits.
+        progress: told the stage (``fit``) and its finished fraction.
+
+    Returns:
+        Pass it as ``predictor`` to ``best_route``, or ask its ``error(route)``.
+    """
+    recorded = load_motions(load_motions(motions), fps=fps)
+    chosen = list(pairs or recorded.pairs)
+    errors: dict[tuple[str, str], float] = {}
+    for done, (a, b) in enumerate(chosen):
+        if recorded.bodies[a].kind > recorded.bodies[b].kind:
+            a, b = b, a  # human to robot is the fitted direction
+        pair = recorded.pair(a, b)
+        (model,) = fit_many([pair], method, preset, [seed], **fit_options(preset, fps))
+        rows = np.arange(len(pair))[:: max(1, len(pair) // MOST_TRAINING_FRAMES)]
+        for link, given, wanted in ((model, pair.source, pair.target), (model.inverse(), pair.target, pair.source)):
+            gap = landmark_gap(link.source, link.target, link(given[rows]), wanted[rows])
+            errors[link.source.name, link.target.name] = gap / link.target.reach
+        if progress:
+            progress("fit", (done + 1) / len(chosen))
+    return measured_bodies(errors)
+
+
+def landmark_gap(source: Embodiment, target: Embodiment, mapped: FloatArray, wanted: FloatArray) -> float:
+    """Mean distance of elbows and wrists [m] on the arms that both bodies have.
+
+    Args:
+        source: who leads.
+        target: who follows.
+        mapped: frames ``(N, F)`` of the target that a mapping gave.
+        wanted: frames ``(N, F)`` that it should have given.
+    """
+    arms = [i for i, side in enumerate(target.sides) if side in source.sides] or list(range(len(target.sides)))
+    gap = target.arm_points(mapped)[:, arms, 1:] - target.arm_points(wanted)[:, arms, 1:]
+    return float(np.linalg.norm(gap, axis=-1).mean())
+
+
+def fit_options(preset: str | None, fps: float) -> dict[str, Any]:
+    """No error bound, and a lag of the same time at any frame rate."""
+    return {} if preset == "paper" else {"lag": max(1, round(_LAG_SECONDS * fps)), "confidence": False}

@@ -74,6 +74,9 @@ class Transferability:
         KL: the divergence inside Eq. 9; ``None`` in the general definition, which has none.
         error: expected landmark error on unseen actions [m]; ``dry_run`` only.
         standard_error: of ``error``, over actions [m]; ``dry_run`` only.
+        samples: poses sampled per arm; ``general`` only, whose T rises with them by some percent and is therefore
+            comparable at equal resolution alone.
+        cell: edge of the cells in which manipulability is averaged [arm lengths]; ``general`` only.
         notes: what a reader should know about this pair (planar arms, missing arms, little coverage).
     """
 
@@ -93,6 +96,8 @@ class Transferability:
     notes: tuple[str, ...] = ()
     error: float | None = None
     standard_error: float | None = None
+    samples: int | None = None
+    cell: float | None = None
 
     @property
     def tolerance(self) -> float:
@@ -299,6 +304,8 @@ def _general(a: Embodiment, b: Embodiment, alpha: float, sampling: Sampling, sto
         T=alpha * ratio * C,
         noise_floor=1.0 - self_capability,
         spread=float(per_repeat.std(ddof=1)),
+        samples=sampling.samples,
+        cell=sampling.cell,
         notes=(*notes, *_planar_notes(a, b, pairs), *_coverage_note(a, b, coverage)),
     )
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from syda_gym.errors import MotionError, OptionError
+from syda_gym.motions.clip import Motions
 
-__all__ = ["alpha_from_noise", "high_frequency_noise"]
+__all__ = ["alpha_from_noise", "high_frequency_noise", "sensor_noise"]
 
 # Third differences of independent noise have the variance (1 + 9 + 9 + 1) sigma^2 (binomial coefficients squared).
 _GAIN = np.sqrt(20.0)
 _MEDIAN_TO_SIGMA = 0.6745
+_DIFFERENCES = 3
 
 
 def high_frequency_noise(clips: Iterable[ArrayLike]) -> float:
@@ -36,6 +38,25 @@ def high_frequency_noise(clips: Iterable[ArrayLike]) -> float:
     if not rough:
         raise MotionError("noise needs at least one clip of four frames; got none")
     return float(np.median(np.abs(np.concatenate(rough))) / (_MEDIAN_TO_SIGMA * _GAIN))
+
+
+def sensor_noise(motions: Motions, names: Sequence[str] | None = None) -> dict[str, float]:
+    """Noise of each body's landmarks in recordings [m], for ``sensor=`` of the dry run.
+
+    What is correlated in time is not seen (see ``high_frequency_noise``), so that smoothed recordings look better than
+    their sensor. A body without a clip of four frames is left out and keeps the default.
+
+    Args:
+        motions: recordings at their own frame rate.
+        names: bodies; all by default.
+    """
+    found = {}
+    for name in names or motions.bodies:
+        body = motions.bodies[name]
+        clips = [body.landmarks(clip.frames) for clip in motions.clips(name) if len(clip) > _DIFFERENCES]
+        if clips:
+            found[name] = high_frequency_noise(clips)
+    return found
 
 
 def alpha_from_noise(noise: Mapping[str, float], resolution: float = 0.005) -> dict[frozenset[str], float]:

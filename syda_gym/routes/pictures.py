@@ -39,7 +39,7 @@ def clouds_png(
     target: Body,
     definition: Definition = "general",
     *,
-    samples: int = 2**18,
+    samples: int = Sampling.samples,
     seed: int = 0,
     store: WorkspaceStore = MEMORY,
     width: float = 13.0,

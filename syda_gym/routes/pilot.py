@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from syda_gym.embodiments import catalog
-from syda_gym.embodiments.embodiment import Embodiment
+from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.errors import MappingError, OptionError, RouteError, SydaError, nearest_name
 from syda_gym.motions.clip import Motions
 
 if TYPE_CHECKING:
     from syda_gym.mappings.mapping import Mapping
     from syda_gym.routes.links import Links
+    from syda_gym.routes.measured import MeasuredBodies
     from syda_gym.routes.route import Route
 
 __all__ = ["AUTO", "Pilot", "PlannedRoute"]
@@ -65,6 +66,8 @@ class Pilot:
         via: bodies that a route may pass; by default those of the paper that the motions hold, or all that this user
             recorded.
         seed: of fits.
+        predictor: what routes are ranked by: ``dry_run``, ``measured`` (training errors of the fitted pairs) or a name
+            of ``routing.PREDICTORS``.
 
     Attributes:
         notices: what a person should know about the choice, a line each.
@@ -86,10 +89,12 @@ class Pilot:
         held_out: Sequence[str] = (),
         via: Sequence[str] | None = None,
         seed: int = 0,
+        predictor: str = "dry_run",
     ) -> None:
         from syda_gym.mappings.mapping import Mapping
 
-        self.motions = motions
+        self.motions, self.predictor, self.seed = motions, _predictor(predictor), seed
+        self._held_out = tuple(held_out)
         self.operator, self.robot = (_name(body) for body in (operator, robot))
         self.notices: tuple[str, ...] = ()
         self._ends = [body if isinstance(body, Embodiment) else self._found(body) for body in (operator, robot)]
@@ -119,20 +124,40 @@ class Pilot:
         """The routes that an environment may take.
 
         Args:
-            route: ``"auto"`` for the best one, ``"sample"`` for all (to draw from in proportion to transferability), or
-                the names of the bodies.
+            route: ``"auto"`` for the best one, ``"sample"`` for all (to draw from in proportion to transferability),
+                ``"per_motion"`` for all, the best one first (``for_clips`` says which for a clip), or the names of the
+                bodies.
 
         Raises:
             RouteError: unknown bodies, a missing link, or ends that are not operator and robot.
+            OptionError: ``"per_motion"`` with a predictor that knows no motion.
         """
         if not isinstance(route, str):
             return (self._planned(self._explicit(route)),)
-        if route not in ("auto", "sample"):
-            raise RouteError(f"route must be 'auto', 'sample' or names of bodies, got {route!r}")
+        if route not in ("auto", "sample", "per_motion"):
+            raise RouteError(f"route must be 'auto', 'sample', 'per_motion' or names of bodies, got {route!r}")
+        if route == "per_motion" and self.predictor != "dry_run":
+            raise OptionError(
+                f"route='per_motion' asks the dry run, for it alone knows the motion; drop predictor={self.predictor!r}"
+            )
         if self._given is not None:
             return (self._planned(self._given.route),)
         routes = self._ranked()
-        return tuple(PlannedRoute(r.bodies, float(r.T)) for r in (routes if route == "sample" else routes[:1]))
+        return tuple(PlannedRoute(r.bodies, float(r.T)) for r in (routes[:1] if route == "auto" else routes))
+
+    def for_clips(self, routes: Sequence[PlannedRoute], clips: Sequence[FloatArray], fps: float) -> list[int]:
+        """Which of the routes to take for each clip of the operator, see ``per_motion.routes_for_clips``.
+
+        Args:
+            routes: of ``plan("per_motion")``.
+            clips: frames ``(N, F)`` of the operator.
+            fps: of the clips.
+        """
+        from syda_gym.routes.per_motion import routes_for_clips
+
+        names = [route.bodies for route in routes]
+        bodies = {name: self._body(name) for route in names for name in route}
+        return routes_for_clips(bodies, names, clips, fps, seed=self.seed)
 
     def mapping(self, bodies: Sequence[str]) -> Mapping:
         """The chain along ``bodies``; links are loaded or fitted on first use."""
@@ -238,9 +263,34 @@ class Pilot:
         from syda_gym.routes.routing import ranked_routes
 
         pairs = [(self._body(a), self._body(b)) for a, b in self.fitted]
+        predictor = self._measured() if self.predictor == "measured" else self.predictor
         return ranked_routes(
-            self._body(self.operator), self._body(self.robot), pairs, max_hops=_MAX_HOPS, directed=True
+            self._body(self.operator),
+            self._body(self.robot),
+            pairs,
+            max_hops=_MAX_HOPS,
+            directed=True,
+            predictor=predictor,
         )
+
+    def _measured(self) -> MeasuredBodies:
+        """From the training errors of the fitted pairs, on frames that they have seen."""
+        from syda_gym.routes.measured import MOST_TRAINING_FRAMES, landmark_gap, measured_bodies
+
+        if self.motions is None or self._links is None:
+            raise OptionError(
+                "predictor='measured' needs recordings of the fitted pairs; name motions that hold them, or use "
+                "predictor='dry_run'"
+            )
+        errors = {}
+        for a, b in self.fitted:
+            pair = self.motions.pair(a, b)
+            seen = pair.without_actions(self._held_out) if self._held_out else pair
+            rows = np.arange(len(seen))[:: max(1, len(seen) // MOST_TRAINING_FRAMES)]
+            link = self._links.link(a, b)
+            gap = landmark_gap(link.source, link.target, link(seen.source[rows]), seen.target[rows])
+            errors[a, b] = gap / link.target.reach
+        return measured_bodies(errors)
 
     def _planned(self, bodies: tuple[str, ...]) -> PlannedRoute:
         from syda_gym.routes.routing import BodyGraph
@@ -266,6 +316,15 @@ class Pilot:
 
 def _name(body: str | Embodiment) -> str:
     return body.name if isinstance(body, Embodiment) else body
+
+
+def _predictor(name: object) -> str:
+    from syda_gym.routes.judges import PREDICTORS
+
+    known = ["dry_run", "measured", *PREDICTORS]
+    if not isinstance(name, str) or name not in known:
+        raise OptionError(f"unknown predictor {name!r}; {nearest_name(str(name), known)}")
+    return name
 
 
 def _connected(edges: Sequence[tuple[str, str]], start: str, end: str) -> bool:

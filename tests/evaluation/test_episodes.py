@@ -100,9 +100,14 @@ def test_the_demo_runs_end_to_end(three_actions, tmp_path):
         command="syda-gym demo",
     )
     assert list(dict.fromkeys(stages)) == ["load", "transferability", "fit", "play", "report"]
-    names = ["adult>pepper", "adult>kid>pepper", "kid>pepper", "kid>adult>pepper"]
-    assert [chain.name for chain in result.chains] == names
-    assert set(result.chosen) == {"adult", "kid"}
+    assert [chain.name for chain in result.chains] == ["adult>kid>pepper"]
+    assert result.chosen.bodies == ("adult", "kid", "pepper")
+    assert result.direct is not None
+    assert result.direct.name == "adult>pepper"
+    assert [one.name for one in result.baselines] == ["unfitted", "ridge (adult>kid>pepper)", "mean pose"]
+    mean_pose = result.baselines[-1].figure("mapping_error").value
+    assert mean_pose > 1.5 * result.chains[0].figure("mapping_error").value
+    assert result.expected[0].error == pytest.approx(result.chains[0].figure("mapping_error").value, rel=0.8)
     actions = {take.action for take in three_actions.takes}
     for chain in result.chains:
         assert {episode.action for episode in chain.episodes} == actions  # every action was left out once
@@ -111,10 +116,17 @@ def test_the_demo_runs_end_to_end(three_actions, tmp_path):
     assert files == {path.name for path in tmp_path.iterdir()}
     stored = json.loads((tmp_path / "results.json").read_text())
     assert (
-        stored["chains"]["adult>pepper"]["landmark_error"]["value"] == result.chains[0].figure("landmark_error").value
+        stored["chains"]["adult>kid>pepper"]["landmark_error"]["value"]
+        == result.chains[0].figure("landmark_error").value
     )
     page = result.report.read_text()
-    for word in ("adult &gt; pepper", "Table 2", "video/mp4", "syda-gym demo"):
+    for word in (
+        "adult &gt; kid &gt; pepper",
+        "What this shows",
+        "What to do next with your robot",
+        "video/mp4",
+        "syda-gym demo",
+    ):
         assert word in page, word
 
 

@@ -119,7 +119,7 @@ class Ground:
     def _chunk(
         self, plays: list[int], rngs: list[np.random.Generator], drawn: list[Drawn | None]
     ) -> list[tuple[FloatArray, ...]]:
-        """Base, age, reference, operator and preview of some episodes; their frames are mapped together."""
+        """Base, age, reference, operator and preview of some episodes."""
         seen, newest, firsts = [], [], []
         for clip, rng, values in zip(plays, rngs, drawn, strict=True):
             frames, packets, first = self._watch(clip, rng, values)

@@ -46,6 +46,7 @@ class TeleopOptions:
     operator: str | Embodiment = "adult"
     robot: str | os.PathLike[str] | Embodiment = "pepper"
     route: str | Sequence[str] = "auto"
+    predictor: str = "dry_run"
     mapping: str | os.PathLike[str] | Mapping = "syda"
     preset: str | None = None
     motions: str | os.PathLike[str] | Motions = "embedded"

@@ -54,6 +54,7 @@ class Repertoire:
         robot: who follows.
         clips: the clips.
         routes: the routes that an episode may take.
+        clip_routes: index of the route that each clip takes unless the caller says otherwise.
         operator_rows: ``(rows, F)`` operator frames.
     """
 
@@ -78,11 +79,15 @@ class Repertoire:
             held_out=options.held_out,
             via=options.via,
             seed=options.fit_seed,
+            predictor=options.predictor,
         )
         for notice in self.pilot.notices:
             warnings.warn(notice, UserWarning, stacklevel=2)
         self.routes: list[PlannedRoute] = list(self.pilot.plan(options.route))
         self.clips = _entries(source)
+        self.clip_routes: list[int] = [0] * len(source)
+        if options.route == "per_motion":
+            self.clip_routes = self.pilot.for_clips(self.routes, [clip.frames for clip in source], self._control_hz)
         self.operator_rows = _padded([clip.frames for clip in source])
         self._mapped: dict[int, FloatArray] = {}
         self._targets: dict[float, FloatArray] = {}

@@ -11,6 +11,16 @@ import numpy as np
 
 from syda_gym.evaluation.chains import name_of
 from syda_gym.evaluation.demo.playback import _SHOWN_HZ, _liveliest, _stride, _tracks, playback_chain
+from syda_gym.evaluation.demo.story import (
+    cost_words,
+    difference,
+    dry_run_table,
+    next_steps,
+    prediction_plot,
+    question,
+    shows,
+    verdict,
+)
 from syda_gym.evaluation.drawing import draw, png_bytes, write_png
 from syda_gym.evaluation.report import (
     BarPlot,
@@ -28,20 +38,16 @@ from syda_gym.evaluation.report import (
     track,
     write_report,
 )
-from syda_gym.evaluation.report.model import Block, Cell
+from syda_gym.evaluation.report.model import Cell
 from syda_gym.evaluation.report.plots import bar_svg, standalone
-from syda_gym.evaluation.statistics import Estimate, spearman
 from syda_gym.files import write_json, write_text
 from syda_gym.simulation.pictures.video import write_video
 
 if TYPE_CHECKING:
     from syda_gym.evaluation.demo.results import ChainResult, DemoResult
 
-__all__ = ["chain_table", "provenance", "transferability_table", "write_demo_report"]
+__all__ = ["chain_table", "provenance", "write_demo_report"]
 
-_TABLE_2 = {
-    ("adult", "pepper"): 0.2358, ("kid", "pepper"): 0.2335, ("pepper", "kid"): 0.2002, ("pepper", "adult"): 0.1991,
-}  # fmt: skip
 _FILM_FRAMES = 75  # five seconds
 _LANDMARKS = {"left": ("L elbow", "L wrist"), "right": ("R elbow", "R wrist")}
 
@@ -76,13 +82,16 @@ def write_demo_report(
     write_png(picture, folder / "side_by_side.png")
     write_video(folder / "chains.mp4", _film(shown, names, title, tell), _SHOWN_HZ)
     sections = [
+        Section("Whom to record with whom?", [question(result), dry_run_table(result), _graph(result)]),
+        Section(
+            "What came of it", [prediction_plot(result), *cost_words(result), chain_table(result), landmarks, joints]
+        ),
         Section("Playback", [_playback(result)]),
-        Section("Which way to go", [_graph(result), transferability_table(result), _regions(result)]),
-        Section("How good the chains are", [*_chain_words(result), chain_table(result), landmarks, joints]),
         *([Section("The residual policy", result.residual.blocks())] if result.residual else []),
         Section(
             "Pictures",
             [
+                _regions(result),
                 Picture(
                     "Side by side",
                     (folder / "side_by_side.png").read_bytes(),
@@ -91,10 +100,12 @@ def write_demo_report(
                 Picture("Film", (folder / "chains.mp4").read_bytes(), "video/mp4"),
             ],
         ),
+        Section("What this shows", [Text(line) for line in shows(result)]),
+        Section("What to do next with your robot", [Text(line) for line in next_steps(result)]),
     ]
     kind = "synthetic motions, generated from a seed" if result.motions.synthetic else "recorded motions"
     report = Report(
-        "From a human's motion to a humanoid's",
+        "A new operator: whom to record with whom?",
         f"{result.motions.name} ({kind}); every figure is of actions that the mappings had not seen",
         _headlines(result, best),
         sections,
@@ -104,35 +115,12 @@ def write_demo_report(
     return write_report(report, folder)
 
 
-def transferability_table(result: DemoResult) -> Table:
-    """S, D, L, alpha, C and T of every link, with the paper's definition where it applies."""
-    rows: list[list[Cell]] = []
-    for (a, b), link in result.links.items():
-        paper = result.paper_links.get((a, b))
-        rows.append(
-            [f"{a}>{b}", Estimate(link.T, link.T - link.tolerance, link.T + link.tolerance), paper.T if paper else None,
-             _TABLE_2.get((a, b)), 1 - link.S, 1 - link.D, link.L, link.coverage]
-        )  # fmt: skip
-    columns = [
-        Column("Link"),
-        Column("T", tip="transferability, general definition, with its tie band (Eq. 10)"),
-        Column("T, the paper's", digits=4, tip="by the paper's own definition"),
-        Column("Table 2", digits=4, tip="as the paper printed it"),
-        Column("1-S", tip="share of cells where the follower lacks manipulability (Eq. 8)"),
-        Column("1-D", tip="similarity there (Eq. 9)"),
-        Column("L", tip="length ratio (Eq. 7)"),
-        Column("Coverage", tip="share of the leader's cells that the follower reaches at all"),
-    ]
-    chosen = {edge for route in _chosen_routes(result) for edge in zip(route[:-1], route[1:], strict=True)}
-    strong = [index for index, edge in enumerate(result.links) if edge in chosen]
-    return Table("Transferability of every fitted pair", columns, rows, "Links of a chosen route are marked.", strong)
-
-
 def chain_table(result: DemoResult) -> Table:
-    """Every chain with its figures."""
+    """Every chain with its figures, then the direct pair and the baselines."""
+    contenders = [*result.chains, *([result.direct] if result.direct else []), *result.baselines]
     columns = [
         Column("Chain"),
-        Column("T", tip="product of transferabilities along the chain (Eq. 11)"),
+        Column("T", digits=2, tip="of the chain as a whole, in the dry run"),
         Column("Landmark error", "cm", 1, 100, "robot against recorded motion, interquartile mean over episodes"),
         Column("Mapping alone", "cm", 1, 100, "base command against recorded motion, without motors"),
         Column("Joint error", "deg", 1, 180 / np.pi),
@@ -147,8 +135,8 @@ def chain_table(result: DemoResult) -> Table:
     ]
     rows: list[list[Cell]] = [
         [
-            chain.name,
-            chain.transferability,
+            f"{chain.name} (if it had been recorded)" if chain is result.direct else chain.name,
+            chain.transferability if np.isfinite(chain.transferability) else None,
             chain.figure("landmark_error"),
             chain.figure("mapping_error"),
             chain.figure("joint_error"),
@@ -161,14 +149,17 @@ def chain_table(result: DemoResult) -> Table:
             chain.seconds_per_frame,
             len(chain.episodes),
         ]
-        for chain in result.chains
+        for chain in contenders
     ]
-    strong = [i for i, chain in enumerate(result.chains) if chain.route in _chosen_routes(result)]
+    errors = [chain.figure("mapping_error").value for chain in contenders]
+    best = contenders[int(np.argmin(errors))]
+    strong = [contenders.index(best)]
+    strong += [i for i, one in enumerate(contenders) if one is not best and not difference(one, best).excludes_zero]
     note = (
-        "Intervals are 95 % bootstrap intervals over actions. The route that transferability chooses for each operator "
-        "is marked."
+        "Intervals are 95 % bootstrap intervals over actions. Marked is the least error of the mapping alone, and what "
+        f"cannot be told from it. {verdict(result)}."
     )
-    return Table("Every chain as episodes", columns, rows, note, strong)
+    return Table("Every chain as episodes", columns, rows, note, sorted(strong))
 
 
 def provenance(command: str, result: DemoResult) -> dict[str, str]:
@@ -190,20 +181,21 @@ def provenance(command: str, result: DemoResult) -> dict[str, str]:
 
 def _headlines(result: DemoResult, best: ChainResult) -> list[Headline]:
     error = best.figure("landmark_error")
-    operator = best.route[0]
-    route = result.chosen[operator]
-    ties = ", ".join(name_of(other.bodies) for other in route.ties)
+    chosen = result.chosen
+    ties = ", ".join(name_of(other.bodies) for other in chosen.ties)
+    foreseen = f"{100 * chosen.error:.1f} cm expected" if chosen.error is not None else f"T {chosen.T:.2f}"
     lines = [
+        Headline(
+            f"Chosen for {result.cast.operator}, before any fit",
+            " > ".join(chosen.bodies),
+            foreseen + (f"; tie with {ties}" if ties else ""),
+        ),
         Headline(
             f"Landmark error, {best.name}",
             f"{100 * error.value:.1f} cm",
-            f"95 % interval {100 * error.low:.1f} to {100 * error.high:.1f} cm, {error.count} unseen episodes",
+            f"95 % interval {100 * error.low:.1f} to {100 * error.high:.1f} cm, {error.count} unseen episodes; "
+            f"{100 * best.figure('mapping_error').value:.1f} cm without motors",
             "good" if error.value < 0.1 else "warn",
-        ),
-        Headline(
-            f"Route chosen for {operator}",
-            " > ".join(route.bodies),
-            f"transferability {route.T:.3f}" + (f"; within sampling noise of {ties}" if ties else ""),
         ),
         Headline("Success", f"{100 * _mean(best, 'success'):.0f} %", "episodes below 10 cm of mean landmark error"),
     ]
@@ -216,18 +208,14 @@ def _headlines(result: DemoResult, best: ChainResult) -> list[Headline]:
     return lines
 
 
-def _chosen_routes(result: DemoResult) -> list[tuple[str, ...]]:
-    return [route.bodies for route in result.chosen.values()]
-
-
 def _regions(result: DemoResult) -> Picture:
     """Where the robot can stand in for the first operator, after Fig. 3 of the paper."""
     from syda_gym.routes.pictures import clouds_png
 
-    operator = next(iter(result.chosen))
+    operator = result.cast.operator
     bodies = result.motions.bodies[operator], result.robot
-    png, dark = (clouds_png(*bodies, samples=2**18, dark=dark) for dark in (False, True))
-    narrow, narrow_dark = (clouds_png(*bodies, samples=2**18, width=3.5, dark=dark) for dark in (False, True))
+    png, dark = (clouds_png(*bodies, dark=dark) for dark in (False, True))
+    narrow, narrow_dark = (clouds_png(*bodies, width=3.5, dark=dark) for dark in (False, True))
     variants = {"dark": dark, "narrow": narrow, "narrow-dark": narrow_dark}
     return Picture(f"Where {result.robot.name} can move as {operator} does", png, variants=variants)
 
@@ -242,25 +230,8 @@ def _other_pages(shown: Sequence[Track], frame: int, names: Sequence[str]) -> di
 
 
 def _best_chain(result: DemoResult) -> ChainResult:
-    """The chosen chain of the first operator."""
-    route = next(iter(result.chosen.values())).bodies
-    return next(chain for chain in result.chains if chain.route == route)
-
-
-def _chain_words(result: DemoResult) -> list[Block]:
-    scores = [chain.transferability for chain in result.chains]
-    errors = [chain.figure("landmark_error").value for chain in result.chains]
-    if len(scores) < 4:
-        return []
-    rank = spearman(scores, errors)
-    if np.isnan(rank.value):
-        return []
-    return [
-        Text(
-            f"Rank correlation of transferability with landmark error over these {rank.count} chains: "
-            f"{rank.value:+.2f} (95 % interval {rank.low:+.2f} to {rank.high:+.2f}); a useful ranking is negative."
-        )
-    ]
+    """The chain that was chosen."""
+    return next(chain for chain in result.chains if chain.route == result.chosen.bodies)
 
 
 def _landmark_plot(result: DemoResult) -> BarPlot:
@@ -271,8 +242,9 @@ def _landmark_plot(result: DemoResult) -> BarPlot:
 
 def _joint_plot(result: DemoResult) -> BarPlot:
     groups = [_short(name) for name in result.robot.joint_names]
-    best = _chosen_routes(result)
-    shown = [chain for chain in result.chains if chain.route in best or len(chain.route) == 2][:4]
+    shown = [chain for chain in result.chains if chain.route == result.chosen.bodies]
+    shown += [*([result.direct] if result.direct else []), *result.baselines]
+    shown = shown[:4]
     series = {chain.name: [chain.part("joints", i) for i in range(len(groups))] for chain in shown}
     return BarPlot("Error of each chain at each joint", "joint error [degrees]", groups, series, 180 / np.pi)
 
@@ -286,17 +258,16 @@ def _short(joint: str) -> str:
 
 
 def _graph(result: DemoResult) -> RouteGraph:
-    bodies = {body: result.motions.bodies[body].kind for edge in result.links for body in edge}
-    errors = {chain.route: chain.figure("mapping_error").value for chain in result.chains if len(chain.route) == 2}
-    edges = [RouteEdge(a, b, link.T, errors.get((a, b))) for (a, b), link in result.links.items()]
-    chosen = next(iter(result.chosen.values())).bodies
-    note = f"Thicker arrows carry a higher transferability; the route chosen for {chosen[0]} is coloured."
-    return RouteGraph("Fitted pairs and the chosen route", dict(bodies), edges, chosen, note)
+    links = {(link.source, link.target): link for route in result.expected for link in route.links}
+    bodies = {body: result.motions.bodies[body].kind for edge in links for body in edge}
+    edges = [RouteEdge(a, b, link.T, link.error) for (a, b), link in links.items()]
+    note = "Thicker arrows carry a higher T; errors are those expected of the pair alone. The chosen chain is coloured."
+    return RouteGraph("Pairs that could be recorded and the chosen chain", bodies, edges, result.chosen.bodies, note)
 
 
 def _playback(result: DemoResult) -> Playback:
     entries = []
-    for chain in result.chains:
+    for chain in (*result.chains, *([result.direct] if result.direct else [])):
         for recording, mapping in chain.shown:
             episode = next(one for one in chain.episodes if one.motion == recording.motion)
             bound = episode.bound if np.isfinite(episode.bound) else None
@@ -326,15 +297,22 @@ def _results(result: DemoResult) -> dict[str, Any]:
         "motions": result.motions.name,
         "seed": result.seed,
         "held_out": [list(group) for group in result.held_out],
-        "transferability": {name_of(edge): link.as_dict() for edge, link in result.links.items()},
-        "chosen": {operator: route.as_dict() for operator, route in result.chosen.items()},
-        "chains": {
-            chain.name: {
-                "transferability": chain.transferability,
-                "landmark_error": chain.figure("landmark_error").to_dict(),
-                "episodes": [episode.to_dict() for episode in chain.episodes],
-            }
-            for chain in result.chains
-        },
+        "cast": {"operator": result.cast.operator, "between": list(result.cast.between), "robot": result.cast.robot},
+        "expected": [route.as_dict() for route in result.expected],
+        "chosen": result.chosen.as_dict(),
+        "chains": {chain.name: _played(chain) for chain in result.chains},
+        "direct": _played(result.direct) if result.direct else None,
+        "baselines": {chain.name: _played(chain) for chain in result.baselines},
+        "verdict": verdict(result),
+        "shows": shows(result),
         "residual": result.residual.to_dict() if result.residual else None,
+    }
+
+
+def _played(chain: ChainResult) -> dict[str, Any]:
+    return {
+        "transferability": chain.transferability if np.isfinite(chain.transferability) else None,
+        "landmark_error": chain.figure("landmark_error").to_dict(),
+        "mapping_error": chain.figure("mapping_error").to_dict(),
+        "episodes": [episode.to_dict() for episode in chain.episodes],
     }

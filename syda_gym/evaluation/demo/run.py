@@ -1,4 +1,4 @@
-"""The demo: from recordings to benchmarked chains in one call, as ``syda-gym demo`` runs it."""
+"""The demo: whom to pair a new operator with, asked beforehand and checked afterwards, as ``syda-gym demo`` runs it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ import numpy as np
 
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, nearest_name
-from syda_gym.evaluation.chains import Links, Route, action_groups, all_routes, robots_of
+from syda_gym.evaluation.chains import Links, Route, action_groups, name_of, robots_of
+from syda_gym.evaluation.demo.baselines import BASELINES, baseline
+from syda_gym.evaluation.demo.cast import Cast, cast_of, with_frail
 from syda_gym.evaluation.demo.results import ChainResult, DemoResult
 from syda_gym.evaluation.episodes import EpisodeFigures, Recording, figures_of_all, latency, make_env, play_all
 from syda_gym.locks import locked_folder
@@ -22,16 +24,12 @@ from syda_gym.motions.loading import load_motions
 if TYPE_CHECKING:
     from syda_gym.agents.agent import Agent
     from syda_gym.mappings.mapping import Mapping
-    from syda_gym.routes.metric import Transferability
     from syda_gym.routes.route import Route as BestRoute
 
 __all__ = ["run_demo"]
 
 Progress = Callable[[str, float], None]
 """Told the name of the stage and its finished fraction."""
-
-_BODIES = ("adult", "kid", "nao", "pepper")
-"""Bodies of the demo, where the motions have them: a small graph that still has several ways to go."""
 
 _FEW_ACTIONS = 12  # up to so many actions each is left out once; with more, one fifth is held out
 
@@ -46,7 +44,7 @@ def run_demo(
     command: str = "",
     progress: Progress | None = None,
 ) -> DemoResult:
-    """Fits the pairs, ranks and plays every chain, trains a short residual and writes the report.
+    """Asks the dry run with whom a new operator should be paired, then fits and plays every choice, and reports.
 
     Args:
         motions: what ``load_motions`` takes.
@@ -78,46 +76,77 @@ def _run(
 
     clock = _Clock(tell)
     with clock("load"):
-        data = load_motions(motions)
+        data = with_frail(load_motions(motions))
         driven = _robot(data, robot)
-        bodies = [name for name in data.bodies if name in _BODIES or name == driven.name or len(data.bodies) <= 4]
-        operators = [name for name in bodies if data.bodies[name].kind == "human"][:2]
-        routes = all_routes(data, operators, [driven.name], 2, via=bodies)
-        operators = list(dict.fromkeys(route[0] for route in routes))
-        groups = _groups(data, operators[0], driven.name, seed)
+        cast = cast_of(data, driven)
+        groups = _groups(data, cast.operator, driven.name, seed)
     with clock("transferability"):
-        links, paper_links = _measure(data, routes, tell)
-        products = {route: float(np.prod([links[edge].T for edge in _edges(route)])) for route in routes}
-        chosen = {operator: _best(data, routes, operator, driven.name) for operator in operators}
+        expected, chosen = _rehearse(data, cast, tell)
     fitted = Links(data, seed=seed, groups=groups)
+    ridge = Links(data, "ridge", seed=seed, groups=groups)
+    contenders: list[tuple[Route, str, Any]] = [(route, "", fitted.chain) for route in cast.routes]
+    if cast.between:
+        contenders.append((cast.direct, "", fitted.chain))
+    contenders += [
+        (
+            cast.direct,
+            f"{name} ({name_of(chosen.bodies)})" if name == "ridge" else name,
+            _answers(name, data, chosen, ridge),
+        )
+        for name in BASELINES
+    ]
     with clock("fit"):
-        edges = list(dict.fromkeys(edge for route in routes for edge in _edges(route)))
+        edges = list(dict.fromkeys(edge for route, label, _ in contenders if not label for edge in _edges(route)))
         for done, edge in enumerate(edges):
             tell("fit", done / len(edges))
             fitted.link(*edge, groups[0])
     with clock("play"):
-        chains = []
-        for done, route in enumerate(routes):
-            tell("play", done / len(routes))
-            chains.append(_play_chain(data, route, fitted, groups, products[route], seed))
+        played = []
+        products = {route.bodies: float(route.T) for route in expected}
+        for done, (route, label, answer) in enumerate(contenders):
+            tell("play", done / len(contenders))
+            played.append(_play_chain(data, route, label, answer, groups, products.get(route, float("nan")), seed))
     learned = None
     if residual:
         from syda_gym.evaluation.demo.residual import train_and_compare
 
         with clock("residual"):
-            route = chosen[operators[0]].bodies
+            route = chosen.bodies
             apart = groups[0] if len(groups) == 1 else _third(data.pair(route[0], route[-1]).action_names, seed)
             known = fitted if apart in fitted.groups else None
             learned = train_and_compare(
                 data, route, apart, seed, links=known, folder=folder, progress=lambda done: tell("residual", done)
             )
+    chains = [one for one in played if not one.label]
+    direct = chains.pop() if cast.between else None
     result = DemoResult(
-        data, driven, tuple(groups), links, paper_links, chosen, tuple(chains), fitted.count(), learned,
-        clock.seconds, seed,
+        data, driven, cast, tuple(groups), tuple(expected), chosen, tuple(chains),
+        tuple(one for one in played if one.label), direct, fitted.count(), learned, clock.seconds, seed,
     )  # fmt: skip
     with clock("report"):
         page = write_demo_report(result, folder, command=command, progress=lambda done: tell("report", done))
     return DemoResult(**{**result.__dict__, "report": page})
+
+
+def _rehearse(motions: Motions, cast: Cast, tell: Progress) -> tuple[list[BestRoute], BestRoute]:
+    """Every chain in the dry run, best first, and the best one with its ties."""
+    from syda_gym.routes.routing import best_route, ranked_routes
+
+    bodies = motions.bodies
+    pairs = [(bodies[a], bodies[b]) for a, b in dict.fromkeys(edge for route in cast.routes for edge in _edges(route))]
+    ends = bodies[cast.operator], bodies[cast.robot]
+    ranked = ranked_routes(*ends, pairs, max_hops=2, directed=True)
+    tell("transferability", 0.7)
+    return ranked, best_route(*ends, pairs, max_hops=2, directed=True)
+
+
+def _answers(name: str, motions: Motions, chosen: BestRoute, ridge: Links) -> Callable[..., Mapping]:
+    """A baseline as a function of route and held-out actions."""
+
+    def answer(route: Route, held_out: Sequence[str]) -> Mapping:
+        return baseline(name, motions, chosen.bodies, ridge, held_out)
+
+    return answer
 
 
 class _Clock:
@@ -179,40 +208,20 @@ def _edges(route: Sequence[str]) -> list[tuple[str, str]]:
     return list(zip(route[:-1], route[1:], strict=True))
 
 
-def _measure(
-    motions: Motions, routes: list[Route], tell: Progress
-) -> tuple[dict[tuple[str, str], Transferability], dict[tuple[str, str], Transferability]]:
-    from syda_gym.routes.metric import transferability
-    from syda_gym.routes.paper import PAPER_ALPHA
-
-    edges = list(dict.fromkeys(edge for route in routes for edge in _edges(route)))
-    in_paper = {name for pair in PAPER_ALPHA for name in pair} | {"adult", "kid", "pepper"}
-    general, paper = {}, {}
-    for done, (a, b) in enumerate(edges):
-        tell("transferability", done / len(edges))
-        general[a, b] = transferability(motions.bodies[a], motions.bodies[b])
-        if {a, b} <= in_paper:
-            paper[a, b] = transferability(a, b, "paper")
-    return general, paper
-
-
-def _best(motions: Motions, routes: list[Route], operator: str, robot: str) -> BestRoute:
-    from syda_gym.routes.routing import best_route
-
-    pairs = list(dict.fromkeys(edge for route in routes for edge in _edges(route)))
-    fitted = [(motions.bodies[a], motions.bodies[b]) for a, b in pairs]
-    ends = motions.bodies[operator], motions.bodies[robot]
-    return best_route(*ends, fitted, max_hops=2, directed=True)
-
-
 def _play_chain(
-    motions: Motions, route: Route, links: Links, groups: Sequence[tuple[str, ...]], product: float, seed: int
+    motions: Motions,
+    route: Route,
+    label: str,
+    answer: Callable[..., Mapping],
+    groups: Sequence[tuple[str, ...]],
+    product: float,
+    seed: int,
 ) -> ChainResult:
     episodes: list[EpisodeFigures] = []
     shown: list[tuple[Recording, Mapping]] = []
     seconds = []
     for index, group in enumerate(groups):
-        mapping = links.chain(route, group)
+        mapping = answer(route, group)
         env = make_env(mapping, motions, group, self_collision=True)
         try:
             recordings = list(play_all(env, base_alone(env), seed))
@@ -224,7 +233,7 @@ def _play_chain(
                 seconds.append(latency(mapping, None, recordings[0].operator))
         finally:
             env.close()
-    return ChainResult(route, product, tuple(episodes), tuple(shown), float(np.median(seconds)))
+    return ChainResult(route, product, tuple(episodes), tuple(shown), float(np.median(seconds)), label)
 
 
 def base_alone(env: Any) -> Agent:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +20,21 @@ from syda_gym.errors import MotionError
 from syda_gym.motions.synthetic.actions import REST, limb_directions
 from syda_gym.motions.synthetic.range_of_motion import within_range
 
-__all__ = ["Performer", "Score"]
+__all__ = ["Performable", "Performer", "Score"]
 
 _LIMIT_MARGIN = 2e-3  # rad; room for rounding when angles are stored
 _SPEED_SHARE = 0.9  # of a joint's top speed
+
+
+class Performable(Protocol):
+    """Anything that says where limbs point over time."""
+
+    @property
+    def seconds(self) -> float:
+        """Duration."""
+
+    def directions(self, times: FloatArray, side: Side) -> FloatArray:
+        """Upper-arm and forearm unit directions ``(N, 2, 3)`` at ``times`` in body axes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,13 +107,19 @@ class Performer:
         self.noise = noise
         self.variety = variety
         self.style = _style(body, self._rng("style"))
-        self._solver = LimbIK(body) if isinstance(body, Robot) else None
+
+    def directions(self, score: Performable, label: str, fps: float) -> FloatArray:
+        """Limb directions ``(N, arms, 2, 3)`` that this body means to show, its habits included.
+
+        Arguments as ``perform``. A robot may not reach them.
+        """
+        return self._directions(score, fps, self._rng("take", label))
 
     def _rng(self, *labels: str | int) -> np.random.Generator:
         words = [label if isinstance(label, int) else zlib.crc32(label.encode()) for label in labels]
         return np.random.default_rng([self.seed, zlib.crc32(self.body.name.encode()), *words])
 
-    def perform(self, score: Score, label: str, fps: float) -> tuple[FloatArray, NDArray[np.bool_] | None]:
+    def perform(self, score: Performable, label: str, fps: float) -> tuple[FloatArray, NDArray[np.bool_] | None]:
         """Performs a score.
 
         Args:
@@ -118,7 +136,7 @@ class Performer:
             return self._robot_frames(self.body, directions, fps), None
         return self._human_frames(self.body, directions, fps, rng)
 
-    def _directions(self, score: Score, fps: float, rng: np.random.Generator) -> FloatArray:
+    def _directions(self, score: Performable, fps: float, rng: np.random.Generator) -> FloatArray:
         """Limb directions ``(N, arms, 2, 3)`` as this body does them."""
         style, variety = self.style, self.variety
         times = np.arange(round(score.seconds * fps)) / fps
@@ -158,8 +176,7 @@ class Performer:
 
     def _robot_frames(self, robot: Robot, directions: FloatArray, fps: float) -> FloatArray:
         """Angles within limits; smoothed as little as the speed limits demand."""
-        assert self._solver is not None
-        wanted = self._solver.solve(directions)
+        wanted = LimbIK(robot).solve(directions)
         for width in (0.02, 0.04, 0.06, 0.09, 0.13, 0.18, 0.25, 0.35, 0.5):
             frames = _inside(robot, gaussian_filter1d(wanted, width * fps, axis=0, mode="nearest"))
             speed = np.abs(np.diff(frames, axis=0)) * fps

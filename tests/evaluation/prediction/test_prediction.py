@@ -9,9 +9,10 @@ import pytest
 
 from syda_gym.errors import MotionError, OptionError
 from syda_gym.evaluation.prediction.picture import prediction_png
-from syda_gym.evaluation.prediction.study import measure_bodies, validate
+from syda_gym.evaluation.prediction.study import validate
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
+from syda_gym.routes.measured import measure_bodies
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ _HEADER = ("TransX", "TransY", "TransZ", "RotX", "RotY", "RotZ", "RotW")
 _MAX_BYTES = 64 * 2**20
 _MAX_ROWS = 100_000
 _MAX_COLUMN_LETTERS = 2  # columns A to ZZ
-_REFERENCE = re.compile(rb"""(?:\br\s*=\s*["']|\bref\s*=\s*["']|:)\s*\$?([A-Za-z]{0,9})\$?(\d{1,12})""")
+_REFERENCE = re.compile(rb"""(?:\br\s*=\s*["']|\bref\s*=\s*["']|(?<=\d):)\s*\$?([A-Za-z]{0,9})\$?(\d{1,12})""")
 _HIDDEN = re.compile(rb"""\b(?:r|ref)\s*=\s*["'][^"'<>]{0,40}&|<!(?:ENTITY|DOCTYPE)""")
 
 
