@@ -153,7 +153,7 @@ class Pilot:
             clips: frames ``(N, F)`` of the operator.
             fps: of the clips.
         """
-        from syda_gym.routes.per_motion import routes_for_clips
+        from syda_gym.routes.dry_run.per_motion import routes_for_clips
 
         names = [route.bodies for route in routes]
         bodies = {name: self._body(name) for route in names for name in route}

@@ -13,7 +13,7 @@ from syda_gym.embodiments.parametric import parametric_human
 from syda_gym.errors import OptionError
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.synthetic.generator import generate
-from syda_gym.routes.per_motion import routes_for_clips
+from syda_gym.routes.dry_run.per_motion import routes_for_clips
 from syda_gym.routes.pilot import Pilot
 
 
