@@ -13,7 +13,7 @@ import time
 import numpy as np
 
 import syda_gym
-from syda_gym.routes.choice import choose_mapping
+from syda_gym.routes.piloting.choice import choose_mapping
 from syda_gym.teleoperation import LoopSettings, TeleoperationLoop, UdpSource, run
 from syda_gym.teleoperation.incoming.packets import encode_frame
 from syda_gym.teleoperation.outgoing.bullet import BulletSink

@@ -12,7 +12,7 @@ import numpy as np
 
 import syda_gym
 from syda_gym.files import asset
-from syda_gym.routes.choice import choose_mapping
+from syda_gym.routes.piloting.choice import choose_mapping
 from syda_gym.routes.suggestion import suggest
 from syda_gym.teleoperation.setup.robot_setup import add_robot
 

@@ -17,11 +17,11 @@ import numpy as np
 
 from syda_gym.embodiments import catalog
 from syda_gym.files import write_text
+from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.motions import load_motions
 from syda_gym.motions.film.landmarks import HiddenJoints, arm_frame
 from syda_gym.motions.film.pictures import FilmPictures
 from syda_gym.motions.film.pose_model import PoseModel
-from syda_gym.routes.choice import geometric_mapping
 from syda_gym.teleoperation import LoopSettings, MemorySink, ReplaySource, TeleoperationLoop, Tick
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.view.cockpit import Cockpit
@@ -51,7 +51,7 @@ def measure(film: Path, model: Path | None, pictures: int) -> dict[str, float]:
         pictures: how many are looked at; the film begins again at its end.
     """
     adult, pepper = catalog.get("adult"), catalog.get("pepper")
-    loop = TeleoperationLoop(geometric_mapping(adult, pepper), LoopSettings(calibration=0.0))
+    loop = TeleoperationLoop(unfitted(adult, pepper), LoopSettings(calibration=0.0))
     clip = load_motions("embedded").clips("adult")[0]
     cockpit = Cockpit(loop, ReplaySource([clip]), MemorySink(), LiveStatistics())
     hold, parts, seen = HiddenJoints(), [], 0

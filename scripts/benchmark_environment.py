@@ -131,6 +131,24 @@ def against_raw(count: int, physics_hz: float, repeats: int) -> dict[str, float]
     return shares_of(raws, wholes)
 
 
+def against_whole_body(physics_hz: float, repeats: int) -> dict[str, float]:
+    """Seconds of a control step with the whole body, in seconds of one without what stands still, in turns."""
+    envs = [
+        gymnasium.make("SydaTeleop-v0", physics_hz=physics_hz, whole_body=whole, **OPTIONS) for whole in (True, False)
+    ]
+    action, ratios = np.zeros(10, dtype=np.float32), []
+    for repeat in range(repeats):
+        spent = []
+        for env in envs:
+            env.reset(seed=repeat)
+            spent.append(statistics.median(cpu(lambda env=env: env.step(action)) for _ in range(STEPS)))
+        ratios.append(spent[0] / spent[1])
+    apart = [np.array([env.step(action)[4]["q"] for _ in range(STEPS)]) for env in envs if env.reset(seed=0)]
+    for env in envs:
+        env.close()
+    return {"times_faster": statistics.median(ratios), "apart_rad": float(np.abs(apart[0] - apart[1]).max())}
+
+
 def servo_vector(count: int, repeats: int) -> dict[str, float]:
     """Control steps of the servo model, automatic resets included, beside those of raw Bullet physics at 240 Hz."""
     bullet: Any = gymnasium.make("SydaTeleop-v0", **OPTIONS)
@@ -282,6 +300,7 @@ def measure(quick: bool) -> dict[str, Any]:
         },
         "single": {label: against_raw(1, hz, repeats) for label, hz in RATES.items()},
         "sixteen": {label: against_raw(16, hz, max(3, repeats // 3)) for label, hz in RATES.items()},
+        "whole_body": {label: against_whole_body(hz, max(3, repeats // 3)) for label, hz in RATES.items()},
         "servo": {str(count): servo_vector(count, repeats) for count in (1, 32, 128, 1024)},
         "reset_ms": 1e3 * reset_time(),
         "frame_ms": {"320x240": 1e3 * frame_time(320, 240), "640x480": 1e3 * frame_time(640, 480)},
@@ -304,6 +323,9 @@ def table(result: dict[str, Any]) -> str:
         rows.append(
             (f"16 robots, {label}: share of raw physics", f"{result['sixteen'][label]['share_of_raw']:.3f}", many)
         )
+    for label, values in result["whole_body"].items():
+        rows.append((f"{label}: times faster than with the whole body", f"{values['times_faster']:.2f}", "1.8"))
+        rows.append((f"{label}: arms apart from those of the whole body [rad]", f"{values['apart_rad']:.5f}", ""))
     for count, ratio in sorted(result["servo_times_raw"].items(), key=lambda row: int(row[0])):
         bar = f"{BARS['servo_1024_times_raw']}" if count == "1024" else ""
         rows.append((f"servo model, {count} robots: times raw physics at 240 Hz", f"{ratio:.0f}", bar))

@@ -34,9 +34,9 @@ from syda_gym.files import write_json
 from syda_gym.mappings.coded_mapping import CodedMapping
 from syda_gym.mappings.coding.mink_ik import MinkArmCoder
 from syda_gym.mappings.limits import limit_speed
+from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.mappings.models.rotation import GeometricRegressor
 from syda_gym.motions.loading import load_motions
-from syda_gym.routes.choice import geometric_mapping
 
 FPS = 30.0
 BENT, STEADY = 30.0, 15.0
@@ -248,7 +248,7 @@ def rivals(body: HumanSkeleton, robot: Robot) -> dict[str, CodedMapping]:
     """mink, with limb directions as they are and after the rotation that fits the embedded motions."""
     from syda_gym.mappings.fitting.fit import fit
 
-    mapping = geometric_mapping(body, robot)
+    mapping = unfitted(body, robot)
     fitted = fit(load_motions("embedded", fps=5.0).pair("adult", "pepper"), method="mink")
     assert isinstance(mapping, CodedMapping)
     assert isinstance(fitted, CodedMapping)
@@ -281,7 +281,7 @@ def _with_rotation(mapping: CodedMapping, main: GeometricRegressor) -> Any:
 def person(robot: Robot, arms: Sequence[Bones], body: HumanSkeleton, frames: FloatArray, every: int) -> dict[str, Any]:
     """All figures of one recording; the optimum of single frames is sought at ``every`` so many of them."""
     wanted = wanted_directions(body, frames)
-    mapping = geometric_mapping(body, robot)
+    mapping = unfitted(body, robot)
     followed = mapping.follow(frames, mapping.begin(), 1.0 / FPS, limited=False)[0]
     single = mapping(frames)
     sequence = mapping.sequence(frames, FPS)
@@ -325,7 +325,7 @@ def straight_arms(robot: Robot, noise: float = 0.01) -> dict[str, float]:
                 along = np.array([x, sign * y, z]) / np.linalg.norm((x, y, z))
                 points[:, side, limb + 1] = points[:, side, limb] + body.arm_lengths[side, limb] * along
         points = points + rng.normal(0.0, noise, points.shape)
-        path = geometric_mapping(body, robot).sequence(body.frames_from_points(points), FPS)
+        path = unfitted(body, robot).sequence(body.frames_from_points(points), FPS)
         spread = np.degrees(path[300:].std(axis=0))
         for joint, value in zip(robot.joint_names, spread, strict=True):
             if joint.endswith("ElbowYaw"):

@@ -38,7 +38,7 @@ from syda_gym.files import read_json, write_json
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.motions.clip import MotionClip
 from syda_gym.motions.loading import load_motions
-from syda_gym.routes.choice import choose_mapping
+from syda_gym.routes.piloting.choice import choose_mapping
 from syda_gym.teleoperation import LoopSettings, TeleoperationLoop, Tick, UdpSink, UdpSource, run
 from syda_gym.teleoperation.incoming.inbox import Inbox
 from syda_gym.teleoperation.incoming.ordering import Ordering

@@ -1,6 +1,7 @@
 """Turns a finished study (scripts/study_agents.py) into docs/study-agents-tables.md, agents.json and the pictures.
 
     python scripts/report_agents.py --study study --out docs
+    python scripts/report_agents.py --study study --validation    # only J on the validation motions, before the test
 
 Tables hold interquartile means over all episodes and seeds of a condition, with bootstrap intervals that redraw
 episodes and seeds within their action. Bars are ratios of means, with the least and the largest ratio of a seed beside
@@ -31,6 +32,14 @@ CELLS = (
     ("full", "harsh"),
 )
 RIVALS = ("base", "lead", "one_euro", "one_euro_lead", "ema_lead", "kalman")
+STACK_BARS = {
+    ("lag", "test"): 1.0,
+    ("noise", "test"): 1.0,
+    ("latency", "test"): 0.93,
+    ("noise-latency", "test"): 0.98,
+    ("full", "test"): 0.98,
+    ("full", "harsh"): 1.0,
+}
 Rows = Mapping[str, Sequence[Mapping[str, Any]]]
 
 
@@ -48,7 +57,7 @@ class Cell:
         first = next(iter(rows.values()))
         self.actions = [str(row["action"]) for row in first]
         self.feasible = np.array([bool(row["feasible"]) for row in first])
-        self.best_rival = min((*RIVALS, "full_rival"), key=lambda rival: float(self.values(rival, "J").mean()))
+        self.best_rival = min((*RIVALS, "full_kalman"), key=lambda rival: float(self.values(rival, "J").mean()))
 
     def values(self, condition: str, figure: str) -> NDArray[np.float64]:
         """One value per seed and episode, ``(seeds, episodes)``."""
@@ -119,6 +128,7 @@ def bars(cells: Mapping[tuple[str, str], Cell]) -> list[str]:
     rows = [_row("bar", "asked", "measured", "held"), "|---|---|---|---|"]
     rows += _lag_bars(cells["lag", "test"])
     rows += _residual_bars(cells)
+    rows += _stack_bars(cells)
     for name, limit in (("noise", 0.95), ("noise-latency", 0.96), ("full", 0.95)):
         rows += _predictor_bars(cells[name, "test"], limit)
     late = cells["latency", "test"]
@@ -150,19 +160,38 @@ def _lag_bars(lag: Cell) -> list[str]:
 
 
 def _residual_bars(cells: Mapping[tuple[str, str], Cell]) -> list[str]:
+    """The policy on the tuned Kalman filter: what it gains where it was trained, and whether it harms elsewhere."""
     rows = []
     for (name, level), cell in cells.items():
         if "residual" not in cell.runs:
             continue
-        j, error, jitter = (Ratio(cell, "residual", "full_rival", f) for f in ("J", "landmark_mm", "jitter"))
+        j, error, jitter = (Ratio(cell, "residual", "full_kalman", f) for f in ("J", "landmark_mm", "jitter"))
         if (name, level) == ("full", "test"):
-            rows.append(_row("full: residual PPO, J against its rival", "<= 0.98", str(j), _verdict(j.mean <= 0.98)))
+            words = "full: residual on the tuned Kalman filter, J against the filter"
+            rows.append(_row(words, "<= 0.95", str(j), _verdict(j.mean <= 0.95)))
         else:
             held = error.mean <= 1.05 and jitter.mean <= 1.2
             rows.append(
                 _row(f"{name}, {level}: the same residual does no harm (J {j.mean:.3f})",
                      "error <= 1.05, jitter <= 1.20", f"{error}, {jitter}", _verdict(held))
             )  # fmt: skip
+    return rows
+
+
+def _stack_bars(cells: Mapping[tuple[str, str], Cell]) -> list[str]:
+    """The default stack, a policy on the predictor, against the predictor; then who is the best row of each cell."""
+    rows = []
+    for (name, level), cell in cells.items():
+        if "stack" not in cell.runs:
+            continue
+        limit = STACK_BARS[name, level]
+        j, jitter = (Ratio(cell, "stack", "predictor", figure) for figure in ("J", "jitter"))
+        held = j.mean <= limit and jitter.mean <= 1.0
+        words = f"{name}, {level}: predictor + residual against the predictor, J and jitter"
+        rows.append(_row(words, f"<= {limit:.2f}, <= 1.00", f"{j}, {jitter}", _verdict(held)))
+        best = min(cell.conditions(), key=lambda condition, cell=cell: float(cell.values(condition, "J").mean()))
+        words = f"{name}, {level}: predictor + residual is the best row"
+        rows.append(_row(words, "it is", f"`{best}`", _verdict(best.endswith("stack"))))
     return rows
 
 
@@ -241,12 +270,39 @@ def learning_picture(study: Path, path: Path) -> None:
     plt.close(figure)
 
 
+def validation(study: Path, out: Path) -> None:
+    """Writes J on the validation motions, in the servo model, of every condition that is there; prints the table."""
+    conditions = ("base", "lead", "kalman", "predictor", "stack", "residual")
+    cells: dict[str, dict[str, dict[str, float]]] = {}
+    for folder in sorted(path.parent for path in study.glob("*/rivals.json")):
+        rivals = read_json(folder / "rivals.json")
+        found = {name: dict(rivals[name]["validation"]) for name in ("base", "lead", "kalman")}
+        for kind in conditions[3:]:
+            curves = [
+                read_json(path)["figures"]["validation_curve"] for path in sorted(folder.glob(f"{kind}-[0-9].json"))
+            ]
+            best = [min(curve, key=lambda point: float(point["J"])) for curve in curves]
+            if best:
+                found[kind] = {name: float(np.mean([point[name] for point in best])) for name in ("J", "jitter")}
+                found[kind]["seeds"] = len(best)
+        cells[folder.name] = found
+    write_json(out / "results" / "agents-validation.json", cells)
+    print(_row("cell", *conditions))
+    print("|---" * (len(conditions) + 1) + "|")
+    for name, found in cells.items():
+        print(_row(name, *(f"{found[kind]['J']:.2f}" if kind in found else "" for kind in conditions)))
+
+
 def main() -> None:
     """Writes the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--study", type=Path, default=Path("study"))
     parser.add_argument("--out", type=Path, default=Path("docs"))
+    parser.add_argument("--validation", action="store_true", help="only the validation motions")
     given = parser.parse_args()
+    if given.validation:
+        validation(given.study, given.out)
+        return
     cells = {
         (name, level): Cell(given.study, name, level)
         for name, level in CELLS

@@ -34,8 +34,8 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.files import atomic_path
+from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.motions.loading import load_motions
-from syda_gym.routes.choice import geometric_mapping
 from syda_gym.teleoperation import LoopSettings, TeleoperationLoop, Tick, UdpSink, UdpSource, run
 from syda_gym.teleoperation.calibration import Calibration
 from syda_gym.teleoperation.incoming.packets import encode_frame
@@ -138,7 +138,7 @@ def _pairs(robot: Robot, count: int) -> dict[str, Any]:
 def stops(args: argparse.Namespace) -> dict[str, Any]:
     """Stops in random states: obeyed in the same tick, without one further step."""
     adult, robot = _adult(), _robot(args.robots[0])
-    loop = TeleoperationLoop(geometric_mapping(adult, robot), LoopSettings(calibration=0.0, hold=0.3))
+    loop = TeleoperationLoop(unfitted(adult, robot), LoopSettings(calibration=0.0, hold=0.3))
     frames = np.concatenate([clip.frames for clip in load_motions("embedded").clips("adult")])
     rng, now, obeyed, states = np.random.default_rng(0), 0.0, 0, dict[str, int]()
     for _ in range(args.count):
@@ -163,7 +163,7 @@ def stops(args: argparse.Namespace) -> dict[str, Any]:
 def wire(args: argparse.Namespace) -> dict[str, Any]:
     """Limits of commands by the time stamps of their packets, on busy cores, in a flood, with stalls."""
     robot, adult = _robot(args.robots[0]), _adult()
-    loop = TeleoperationLoop(geometric_mapping(adult, robot), LoopSettings(calibration=0.0, rate=args.rate))
+    loop = TeleoperationLoop(unfitted(adult, robot), LoopSettings(calibration=0.0, rate=args.rate))
     context, pipes = multiprocessing.get_context("spawn"), multiprocessing.Pipe()
     seconds = args.count / args.rate * 1.1
     with UdpSource(adult, port=0) as source:

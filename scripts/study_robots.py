@@ -29,8 +29,8 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import SydaError
 from syda_gym.files import write_text
 from syda_gym.mappings.limits import limit_speed
+from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.motions.loading import load_motions
-from syda_gym.routes.choice import geometric_mapping
 from syda_gym.simulation.making import make_world
 from syda_gym.simulation.plain_body import weak_joints
 from syda_gym.simulation.rates import Rates
@@ -191,7 +191,7 @@ def study(name: str, path: Path, folder: Path | None) -> Finding:
         points = angles_between(robot, LimbIK.of(robot).solve(wanted), wanted).mean()
         best = best_angles(robot, wanted).mean()
         wave = next(t for t in motions.takes if t.action == WAVE and "adult" in t.frames).frames["adult"]
-        mapped = robot.clamp(geometric_mapping(catalog.get("adult"), robot)(wave))
+        mapped = robot.clamp(unfitted(catalog.get("adult"), robot)(wave))
         sequence = limit_speed(robot, mapped, FPS)
         every = max(1, len(wave) // 16)
         sequence_error = angles_between(robot, sequence, poses(robot, wave)).mean()

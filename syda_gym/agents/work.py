@@ -12,17 +12,18 @@ import numpy as np
 
 from syda_gym.agents.agent import Agent, BaseAlone
 from syda_gym.agents.bundle import load_agent, read_card, save_agent
-from syda_gym.agents.classical.rivals import RIVALS, Lead, make_rival
+from syda_gym.agents.classical.rivals import RIVALS
+from syda_gym.agents.classical.tuned import cell_of, tuned_rival
 from syda_gym.agents.classical.tuning import Tuned, tune
 from syda_gym.agents.figures import Figures
 from syda_gym.agents.interface import Interface
 from syda_gym.agents.predictor.predictor_training import PredictorConfig, train_predictor
 from syda_gym.agents.residual.checkpoint import load_checkpoint
-from syda_gym.agents.residual.config import ResidualConfig
-from syda_gym.agents.residual.residual_training import train_residual
+from syda_gym.agents.residual.config import STACK, ResidualConfig
 from syda_gym.agents.rollout import EpisodeResult, evaluate, mean_of
 from syda_gym.agents.streams.ground import Ground
 from syda_gym.agents.streams.streams import score_streams
+from syda_gym.agents.training import Comparison, beside, compare_on_streams, train_stack, without_lead
 from syda_gym.embodiments.catalog import resolve
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
@@ -38,7 +39,9 @@ from syda_gym.mappings.storage import save_mapping
 __all__ = [
     "PlayedEpisode",
     "TrainingReport",
+    "TunedRival",
     "compare_agents",
+    "default_config",
     "export_bundle",
     "film",
     "find_agent",
@@ -60,12 +63,29 @@ class TrainingReport:
         bundle: where it was stored.
         history: steps or round, figures of the agent, figures of what it stands on.
         best: index into ``history``.
+        comparison: base, lead, tuned Kalman filter, what it stands on, and the agent, on the validation episodes.
     """
 
     agent: Agent
     bundle: Path
     history: tuple[tuple[int, Figures, Figures], ...]
     best: int
+    comparison: Comparison
+
+
+@dataclass(frozen=True)
+class TunedRival:
+    """A rival as ``tune_rivals`` found it.
+
+    Attributes:
+        tuned: settings and figures on the training episodes.
+        before: figures on the validation episodes with the shipped settings of the cell.
+        after: with the new ones.
+    """
+
+    tuned: Tuned
+    before: Figures
+    after: Figures
 
 
 def train_agent(
@@ -73,7 +93,7 @@ def train_agent(
     out: str | os.PathLike[str],
     *,
     config: ResidualConfig | PredictorConfig | None = None,
-    base: str | os.PathLike[str] = "base",
+    base: str | os.PathLike[str] = "",
     seed: int = 0,
     resume: bool = False,
     progress: Progress | None = None,
@@ -85,9 +105,9 @@ def train_agent(
         out: folder of bundle, checkpoints and logs.
         config: a ``ResidualConfig`` trains a residual policy by reinforcement learning, a ``PredictorConfig`` a
             predictor by regression.
-        base: what it stands on: a rival's name, or the path of a bundle. A residual configuration that names a rival of
-            its own comes first where this is ``base``. A lead on top of it is left off below a predictor, which brings
-            its own.
+        base: what it stands on: ``"stack"``, a rival's name (with the settings of the cell), or the path of a bundle.
+            By default what the configuration names: for the shipped ones a predictor, which is trained first, on the
+            tuned Kalman filter. A predictor stands on that filter; a lead is left off, since it brings its own.
         seed: of everything.
         resume: go on from the checkpoint in ``out`` (residual policies).
         progress: called with the share that is done.
@@ -95,7 +115,7 @@ def train_agent(
     Raises:
         SydaError: bad options, nothing to resume, a bundle that does not fit, a folder that another process writes.
     """
-    settings = config or ResidualConfig()
+    settings = config or default_config(options)
     if resume and isinstance(settings, ResidualConfig):
         load_checkpoint(Path(out) / "checkpoint.safetensors")  # before minutes of fitting and recording are spent
     with locked_folder(out, "agent") as folder:
@@ -113,16 +133,19 @@ def _train(
 ) -> TrainingReport:
     ground = Ground(options)
     if isinstance(settings, PredictorConfig):
-        below = find_agent(base, ground.interface)
-        filters = below.base if isinstance(below, Lead) and below.base is not None else below
-        report = _predict(ground, settings, filters, seed, folder, progress)
+        below = find_agent(_named(base) or "kalman", ground.interface, ground.options.disturbances)
+        report = _predict(ground, settings, below, seed, folder, progress)
     else:
-        rival = None if os.fspath(base) == "base" else find_agent(base, ground.interface)
-        trained = train_residual(
-            ground, settings, seed=seed, folder=folder, resume=resume, progress=progress, base=rival
+        rival = None
+        if _named(base):
+            rival = find_agent(base, ground.interface, ground.options.disturbances)
+        elif os.fspath(base) == STACK:
+            settings = ResidualConfig.of({**settings.as_dict(), "base": STACK, "base_settings": {}})
+        found = train_stack(ground, settings, base=rival, seed=seed, folder=folder, resume=resume, progress=progress)
+        history = tuple((leg.steps, leg.policy, leg.base) for leg in found.trained.history)
+        report = TrainingReport(
+            found.trained.agent, folder / "agent.json", history, found.trained.best, found.comparison
         )
-        history = tuple((leg.steps, leg.policy, leg.base) for leg in trained.history)
-        report = TrainingReport(trained.agent, folder / "agent.json", history, trained.best)
     save_agent(
         report.agent,
         folder / "agent",
@@ -131,6 +154,7 @@ def _train(
         figures={
             "validation": report.history[report.best][1].as_dict(),
             "base": report.history[report.best][2].as_dict(),
+            "beside": {name: figures.as_dict() for name, figures in report.comparison.figures.items()},
         },
     )
     save_mapping(ground.repertoire.pilot.mapping(ground.repertoire.routes[0].bodies), folder / "mapping")
@@ -144,8 +168,12 @@ def tune_rivals(
     episodes: int = 32,
     budget: int = 24,
     seed: int = 0,
-) -> dict[str, Tuned]:
+    out: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+) -> dict[str, TunedRival]:
     """Tunes rivals on an environment's motions by the objective ``J``, in the servo model.
+
+    Every fifth action is kept for validation.
 
     Args:
         options: of the environment; keep test motions out of it.
@@ -153,39 +181,59 @@ def tune_rivals(
         episodes: how many are recorded, spread over the clips.
         budget: settings to try per rival.
         seed: of disturbances and search.
+        out: folder to store the tuned agents in, each as a bundle under its name; nothing is stored if left out.
+        progress: called with the share that is done.
     """
     ground = Ground(options)
-    count = min(episodes, ground.clips)
-    clips = np.linspace(0, ground.clips - 1, count).round().astype(int).tolist()
-    streams = ground.record(episodes, clips=clips, seed=seed)
-    return {
-        name: tune(
-            name,
-            ground.interface,
-            lambda agent: score_streams(agent, streams, ground.rates),
-            budget=budget,
-            seed=seed,
+    streams = ground.record_part("train", episodes, seed=seed)
+    validation = ground.record_part("validation", max(episodes // 2, 1), seed=seed + 1)
+    found: dict[str, TunedRival] = {}
+    for place, name in enumerate(names):
+        tuned = tune(
+            name, ground.interface, lambda agent: score_streams(agent, streams, ground.rates), budget=budget, seed=seed
         )
-        for name in names
-    }
+        before = tuned_rival(name, ground.interface, ground.options.disturbances)
+        agent = tuned.build(ground.interface)
+        scores = [score_streams(one, validation, ground.rates) for one in (before, agent)]
+        found[name] = TunedRival(tuned, scores[0], scores[1])
+        if out is not None:
+            save_agent(
+                agent,
+                Path(out) / name,
+                mapping=_mapping_card(ground),
+                training={"tuned": name, "seed": seed, "budget": budget, "options": _described(ground.options)},
+                figures={"training": tuned.figures.as_dict(), "validation": scores[1].as_dict()},
+            )
+        if progress is not None:
+            progress((place + 1) / len(names))
+    return found
 
 
-def find_agent(name: str | os.PathLike[str], where: Any) -> Agent:
+def default_config(options: TeleopOptions | Mapping[str, Any]) -> ResidualConfig:
+    """The shipped configuration for such disturbances: ``undisturbed`` where there are none, else ``teleop``."""
+    given = options if isinstance(options, TeleopOptions) else TeleopOptions(**options)
+    return ResidualConfig.preset("undisturbed" if cell_of(given.disturbances) == "lag" else "teleop")
+
+
+def find_agent(name: str | os.PathLike[str], where: Any, disturbances: Any = None) -> Agent:
     """An agent by name or path.
 
     Args:
         name: of a rival, of a shipped bundle, or the path of a bundle.
         where: environment or interface that it shall act in.
+        disturbances: a rival has the settings that were tuned for their cell; those of the environment by default.
 
     Raises:
         AgentError: no such agent; the message lists what there is.
     """
     interface = where if isinstance(where, Interface) else Interface.of(where)
+    if disturbances is None and not isinstance(where, Interface):
+        disturbances = getattr(where, "unwrapped", where).options.disturbances
     text = os.fspath(name)
     if text == "base":
         return BaseAlone(interface)
     if text in RIVALS:
-        return make_rival(text, interface)
+        return tuned_rival(text, interface, disturbances)
     if text in shipped_agents():
         return load_agent(asset("agents", text), interface)
     if Path(text).with_suffix(".json").is_file() or Path(text).suffix in (".json", ".safetensors"):
@@ -225,7 +273,7 @@ def compare_agents(
     names = list(dict.fromkeys(["base", *(os.fspath(agent) for agent in agents)]))
     return evaluate(
         given,
-        {name: find_agent(name, interface) for name in names},
+        {name: find_agent(name, interface, given.disturbances) for name in names},
         clips=clips,
         draws=draws,
         seed=seed,
@@ -383,11 +431,20 @@ def mean_table(results: Mapping[str, Sequence[EpisodeResult]]) -> dict[str, Figu
 def _predict(
     ground: Ground, config: PredictorConfig, base: Agent, seed: int, folder: Path, progress: Progress | None
 ) -> TrainingReport:
-    train, validation = ground.record(256, seed=2 * seed), ground.record(48, seed=2 * seed + 1)
-    trained = train_predictor(base, train, validation, ground.rates, config, seed=seed, progress=progress)
-    below = score_streams(base, validation, ground.rates)
+    train = ground.record_part("train", 256, seed=2 * seed)
+    validation = ground.record_part("validation", 48, seed=2 * seed + 1)
+    filters = without_lead(base)
+    trained = train_predictor(filters, train, validation, ground.rates, config, seed=seed, progress=progress)
+    below = score_streams(filters, validation, ground.rates)
     history = tuple((index, figures, below) for index, figures in enumerate(trained.history))
-    return TrainingReport(trained.agent, folder / "agent.json", history, trained.best)
+    agents = beside(ground, base) | {"predictor": trained.agent}
+    comparison = compare_on_streams(agents, validation, ground)
+    return TrainingReport(trained.agent, folder / "agent.json", history, trained.best, comparison)
+
+
+def _named(base: str | os.PathLike[str]) -> str:
+    """The base where one is named, neither left to the configuration nor the stack."""
+    return "" if os.fspath(base) in ("", STACK) else os.fspath(base)
 
 
 def _plausible(interface: Interface, steps: int = 50) -> Any:

@@ -19,6 +19,7 @@ from syda_gym.errors import nearest_name
 __all__ = [
     "address",
     "agents",
+    "agents_or",
     "between",
     "bundle",
     "disturbances",
@@ -170,6 +171,15 @@ def agents(values: str | Sequence[str] | None) -> Any:
     return values
 
 
+def agents_or(*words: str) -> Check:
+    """A known agent's name, the path of a stored bundle, one of some words, or nothing."""
+
+    def check(value: str | None) -> Any:
+        return value if not value or value in words else agents(value)
+
+    return check
+
+
 def bundle(text: str) -> str:
     """A shipped agent's name, or the path of a stored bundle; rivals are not stored."""
     if text in SHIPPED_AGENTS or _is_bundle(text):
@@ -188,7 +198,7 @@ def named_or_file(known: Collection[str], what: str, *endings: str) -> Check:
     """
 
     def check(value: str) -> str:
-        if value in known:
+        if not value or value in known:
             return value
         if value.endswith(endings):
             if not Path(value).is_file():
@@ -206,7 +216,7 @@ def address(written: Sequence[str], what: str) -> Check:
         written: how they are written, for example ``udp:PORT``.
         what: ``"source"`` or ``"sink"``.
     """
-    kinds = {text.partition(":")[0] for text in written}
+    kinds = {text.partition(":")[0].partition("[")[0] for text in written}
 
     def check(values: Any) -> Any:
         for text in [values] if isinstance(values, str) else values or ():

@@ -20,7 +20,7 @@ from syda_gym.cli.options import (
 from syda_gym.cli.shared import console, interruptible, print_json, say_written, show_table, stages
 
 if TYPE_CHECKING:
-    from syda_gym.routes.own import OwnFit
+    from syda_gym.routes.piloting.own import OwnFit
 
 __all__ = ["fit"]
 
@@ -51,7 +51,7 @@ def fit(
     Name operator and robot if the data hold several pairs.
     """
     from syda_gym.errors import OptionError
-    from syda_gym.routes.own import fit_own
+    from syda_gym.routes.piloting.own import fit_own
 
     if (operator is None) != (robot is None):
         raise OptionError("give both --operator and --robot, or neither")

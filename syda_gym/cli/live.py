@@ -199,7 +199,7 @@ def teleop(
     model: ModelOption = None,
 ) -> None:
     """Drive a robot live: calibrate, map, filter, keep to limits and speeds, avoid self-collision, send."""
-    from syda_gym.routes.choice import choose_mapping
+    from syda_gym.routes.piloting.choice import choose_mapping
     from syda_gym.teleoperation.addresses import read_token
     from syda_gym.teleoperation.journal import replay_journal as decide_anew
     from syda_gym.teleoperation.session import teleoperate

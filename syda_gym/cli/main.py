@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from syda_gym.cli import agents, benchmark, fit, live, motions, routes, studies
+from syda_gym.cli import benchmark, fit, live, motions, routes, studies
+from syda_gym.cli.acting import agents, tune
 from syda_gym.cli.shared import Interrupted, console
 from syda_gym.cli.spellings import Program
 from syda_gym.errors import SydaError
@@ -79,6 +80,7 @@ app.command("reproduce-paper")(studies.reproduce_paper)
 app.command()(routes.transferability)
 app.command()(routes.route)
 app.command()(agents.train)
+app.command()(tune.tune)
 app.command()(agents.evaluate)
 app.command()(agents.play)
 app.command()(agents.export)

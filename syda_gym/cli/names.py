@@ -25,6 +25,7 @@ __all__ = [
     "SINGLE_DISTURBANCES",
     "SINKS",
     "SOURCES",
+    "STACK",
     "ticked",
 ]
 
@@ -83,6 +84,9 @@ SHIPPED_AGENTS = tuple(
 
 ACTING = (*RIVALS, *SHIPPED_AGENTS)
 """Every agent that is known by name."""
+
+STACK = "stack"
+"""The base of a residual policy that stands on a predictor, which is trained first."""
 
 KINDS = ("residual", "predictor")
 """What ``train`` trains."""

@@ -354,6 +354,7 @@ class Fleet:
             count=self.count,
             physics=options.physics,
             self_collision=bool(options.self_collision),
+            whole_body=bool(options.whole_body),
         )
 
     def _draw(self, rng: Generator, wish: EpisodeWish) -> tuple[int, int, int]:

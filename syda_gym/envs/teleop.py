@@ -186,6 +186,7 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     | ``control_hz``, ``physics_hz`` | ``30``, ``240`` | physics must be a whole multiple of control |
     | ``physics`` | ``"bullet"`` | or ``servo``: the motor law in numpy, hundreds of times faster, without contacts |
     | ``self_collision`` | ``False`` | links of the robot collide with each other |
+    | ``whole_body`` | ``False`` | simulate head, hip, knee and wheels as joints, too, for three times the cost |
     | ``reward`` | ``None`` | weights that differ from the table above |
     | ``terminate_error`` | ``None`` | mean landmark error that ends an episode [m] |
     | ``success_error`` | ``0.1`` | mean landmark error of a successful episode [m] |

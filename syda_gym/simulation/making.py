@@ -11,7 +11,13 @@ __all__ = ["make_world"]
 
 
 def make_world(
-    robot: Robot, rates: Rates, *, count: int = 1, physics: str = "bullet", self_collision: bool = False
+    robot: Robot,
+    rates: Rates,
+    *,
+    count: int = 1,
+    physics: str = "bullet",
+    self_collision: bool = False,
+    whole_body: bool = False,
 ) -> Backend:
     """Builds a world.
 
@@ -21,6 +27,7 @@ def make_world(
         count: number of robots.
         physics: one of ``BACKENDS``.
         self_collision: whether a robot's links collide with each other (``bullet`` only).
+        whole_body: whether head, legs and wheels are simulated, too (``bullet`` only; see ``World``).
 
     Raises:
         OptionError: unknown physics, or self-collision asked of a physics without contacts.
@@ -35,4 +42,4 @@ def make_world(
         return ServoWorld(robot, rates, count)
     from syda_gym.simulation.world import World
 
-    return World(robot, rates, count, self_collision=self_collision)
+    return World(robot, rates, count, self_collision=self_collision, whole_body=whole_body)

@@ -116,17 +116,22 @@ def _follows(joint: Joint, rest: Mapping[str, float]) -> bool:
     return abs(rest.get(joint.name, 0.0) - mimic.multiplier * rest.get(mimic.joint, 0.0) - mimic.offset) < 1e-6
 
 
-def plain_body(robot: Robot, roles: Sequence[str] = (), tree: UrdfTree | None = None) -> PlainBody:
+def plain_body(
+    robot: Robot, roles: Sequence[str] = (), tree: UrdfTree | None = None, *, whole: bool = True
+) -> PlainBody:
     """Writes a robot for PyBullet.
 
     Args:
         robot: whose arms move.
         roles: ``collision`` and/or ``visual``: the shapes that are wanted.
         tree: another file of the same robot, for its looks; by default the robot's own.
+        whole: whether a file that PyBullet reads as it is meant is loaded with all its joints and links. If not, it is
+            written anew like any other: joints that are no arm joints are fixed and fixed links merged, which costs a
+            physics step of Pepper a third.
     """
     own = read_urdf(robot.urdf)
     tree = tree or own
-    if is_plain(robot, tree):
+    if whole and is_plain(robot, tree):
         points = tuple(link for arm in _arms(robot) for link in (arm.elbow, arm.wrist))
         return PlainBody("", None, robot.description.torso, points, {})
     return _Writer(robot, tree, roles, looks=tree is not own).body()

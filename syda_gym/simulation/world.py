@@ -44,13 +44,19 @@ class World:
         rates: control and physics rate.
         count: number of robots.
         self_collision: whether a robot's links collide with each other, except the pairs that its description disables.
+        whole_body: whether joints that are no arm joints (head, hip, knee, wheels) are simulated, too, each held by a
+            motor of its own, and links on fixed joints each by itself. Without, they are one with what carries them,
+            which costs a fraction and moves the arms alike (``scripts/benchmark_environment.py``). With self-collision
+            the whole body is always simulated, since contacts are counted by links.
 
     Raises:
         OptionError: ``count`` is not positive.
         EmbodimentError: PyBullet cannot load the URDF or lacks one of its joints.
     """
 
-    def __init__(self, robot: Robot, rates: Rates, count: int = 1, *, self_collision: bool = False) -> None:
+    def __init__(
+        self, robot: Robot, rates: Rates, count: int = 1, *, self_collision: bool = False, whole_body: bool = False
+    ) -> None:
         if count < 1:
             raise OptionError(f"a world needs at least one robot, got {count}")
         self.robot = robot
@@ -63,7 +69,7 @@ class World:
         self._clients: list[int] = []
         self._puppets: list[_Puppet] = []
         per_client = 1 if self_collision else ROBOTS_PER_CLIENT
-        body = plain_body(robot, ("collision",) if self_collision else ())
+        body = plain_body(robot, ("collision",) if self_collision else (), whole=whole_body or self_collision)
         try:
             for first in range(0, count, per_client):
                 client = _connect(rates)

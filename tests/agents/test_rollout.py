@@ -10,7 +10,7 @@ from syda_gym.agents.classical.rivals import make_rival
 from syda_gym.agents.interface import Interface
 from syda_gym.agents.rollout import evaluate, mean_of
 from syda_gym.agents.streams.ground import Ground
-from syda_gym.agents.streams.streams import join, play_streams, read_stream
+from syda_gym.agents.streams.streams import Past, join, play_streams, read_stream
 from syda_gym.envs.fleet import EpisodeWish, Fleet
 from syda_gym.envs.spaces import action_from_command
 from syda_gym.envs.task.options import TeleopOptions
@@ -18,11 +18,17 @@ from syda_gym.errors import AgentError
 
 
 @pytest.mark.parametrize(
-    ("disturbances", "reference"), [("teleop:full:train", "mapped"), ("teleop:full:test", "paired"), (None, "paired")]
+    ("disturbances", "reference", "seen"),
+    [
+        ("teleop:full:train", "mapped", {}),
+        ("teleop:full:test", "paired", {"preview": 2, "history": 3}),
+        (None, "paired", {"preview": 3}),
+        (None, "mapped", {"history": 2}),
+    ],
 )
-def test_recorded_streams_are_what_the_environment_plays_bit_for_bit(tiny_options, disturbances, reference):
+def test_recorded_streams_are_what_the_environment_plays_bit_for_bit(tiny_options, disturbances, reference, seen):
     options = TeleopOptions(
-        **{**tiny_options, "disturbances": disturbances, "reference": reference, "action_mode": "position"}
+        **{**tiny_options, "disturbances": disturbances, "reference": reference, "action_mode": "position", **seen}
     )
     ground, count = Ground(options), 3
     streams = ground.record(count, seed=5)
@@ -30,11 +36,13 @@ def test_recorded_streams_are_what_the_environment_plays_bit_for_bit(tiny_option
     rngs = [np.random.default_rng([5, i]) for i in range(count)]
     fleet.reset(range(count), rngs, [EpisodeWish(clip=i) for i in range(count)])
     q = play_streams(BaseAlone(ground.interface), streams, ground.rates)
-    seen = fleet.observe()
+    seen, past = fleet.observe(), Past(ground.interface, count)
+    past.begin(np.arange(count), streams.base[:, 0])
     for k in range(int(streams.lengths.min())):
         assert np.array_equal(fleet.base, streams.base[:, k])
         angles, speeds = (seen[:, fleet.layout[name]].astype(float) for name in ("q", "qd"))
-        reading = read_stream(ground.interface, streams, k, angles, speeds)
+        reading = read_stream(ground.interface, streams, k, angles, speeds, past.rows)
+        past.add(streams.base[:, k], angles)
         for name, part in fleet.layout.items():
             if name != "previous_action":
                 assert np.allclose(seen[:, part], reading.observation[:, part], atol=1e-5), name
@@ -86,11 +94,6 @@ def test_wrong_agents_are_refused(tiny_options, interface):
         evaluate(tiny_options, {"mine": object()}, clips=[0])
     with pytest.raises(AgentError, match="made for another observation"):
         evaluate(tiny_options, {"mine": BaseAlone(interface)}, clips=[0])
-
-
-def test_training_grounds_take_no_preview(tiny_options):
-    with pytest.raises(AgentError, match="without preview"):
-        Ground({**tiny_options, "preview": 2})
 
 
 def test_streams_join_and_select(ground):

@@ -62,7 +62,7 @@ def test_a_predictor_trains_by_the_same_function(tiny_options, tmp_path, monkeyp
 def test_rivals_are_tuned_on_an_environment(tiny_options):
     options = {**tiny_options, "disturbances": None, "reference": "mapped"}
     tuned = tune_rivals(options, ["base", "lead"], episodes=2, budget=6)
-    assert tuned["lead"].figures.objective < tuned["base"].figures.objective
+    assert tuned["lead"].tuned.figures.objective < tuned["base"].tuned.figures.objective
 
 
 def test_unknown_agents_and_shipped_ones(ground):

@@ -75,7 +75,7 @@ def test_every_old_spelling_is_tried_above():
 def test_values_that_mean_the_new_thing_stay(tmp_path: Path, capsys):
     assert read(f"teleop --mapping {tmp_path}")["mapping"] == tmp_path
     assert read("train --preset paper")["preset"] == "paper"
-    assert read("train --preset paper")["config"] == "undisturbed"
+    assert read("train --preset paper")["config"] == ""
     assert read("reproduce-paper -m x --method syda:paper")["method"] == ["syda:paper"]
     assert capsys.readouterr().err == ""
 

@@ -196,8 +196,9 @@ def test_base_commands_and_mapped_references_obey_the_speed_limits(hasty, distur
                 np.testing.assert_allclose(ahead[1], info["base"], atol=1e-6)
         assert (np.abs(np.diff(base, axis=0)) <= most).all()
         assert (np.abs(np.diff(references, axis=0)) <= most).all()
-        jumps = np.abs(np.diff(repertoire.mapped_rows(0)[clip.rows], axis=0))
-        assert (jumps > most).any(), "nothing was too fast: the test shows nothing"
+        # Frame by frame, without a solver that keeps time, the operator is too fast for the robot.
+        alone = repertoire.pilot.mapping(repertoire.routes[0].bodies)(repertoire.operator_rows[clip.rows])
+        assert (np.abs(np.diff(alone, axis=0)) > most).any(), "nothing was too fast: the test shows nothing"
         assert (base[0] == repertoire.mapped_rows(0)[clip.first]).all() == (disturbances is None)
 
 
@@ -258,7 +259,7 @@ def test_reset_options_choose_motion_frame_and_route(cheap, motions):
     for bad in ({"motion": "nope"}, {"motion": 99}, {"frame": -1}, {"frame": 10_000}, {"speed": 1}, {"frame": 1.5}):
         with pytest.raises(OptionError):
             env.reset(options=bad)
-    with pytest.raises(RouteError, match="no mapping for the link"):
+    with pytest.raises(RouteError, match="no mapping leads from or to 'tall'"):
         env.reset(options={"route": ("adult", "tall", "pepper")})
 
 

@@ -136,12 +136,16 @@ def test_the_short_residual_begins_as_the_base_and_is_stored(three_actions, tmp_
 
     held_out = (three_actions.takes[0].action,)
     links = Links(three_actions, "ridge", groups=[held_out])
-    config = ResidualConfig(steps=512, robots=8, rollout=32, batch=128, legs=1, episodes=8, validation_episodes=4)
+    config = ResidualConfig(
+        base="stack", steps=512, robots=8, rollout=32, batch=128, legs=1, episodes=8, validation_episodes=4
+    )
     result = train_and_compare(
-        three_actions, ("adult", "pepper"), held_out, links=links, config=config, folder=tmp_path
+        three_actions, ("adult", "pepper"), held_out, links=links, config=config, iterations=2, folder=tmp_path
     )
     assert result.untrained_is_base
-    assert [agent.name for agent in result.agents] == ["base", "lead", "residual"]
+    assert [agent.name for agent in result.agents] == ["base", "lead", "kalman", "predictor", "residual"]
+    assert result.best_other().name != "residual"
+    assert np.mean(result.best_other().costs) == min(np.mean(agent.costs) for agent in result.agents[:-1])
     base, lead = result.agent("base"), result.agent("lead")
     assert np.mean(lead.tracking) < np.mean(base.tracking)  # the lead undoes the motors' lag
     assert {episode.action for episode in base.episodes} == set(held_out)
@@ -149,7 +153,7 @@ def test_the_short_residual_begins_as_the_base_and_is_stored(three_actions, tmp_
     card = json.loads((tmp_path / "residual.json").read_text())
     assert held_out[0] not in card["training"]["actions"]
     assert result.playback()[0].clip == base.recordings[0].motion
-    assert len(result.table().rows) == 3
+    assert len(result.table().rows) == 5
 
 
 def test_the_demo_finds_bad_input_before_it_works(tmp_path, small_motions):

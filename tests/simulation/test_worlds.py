@@ -116,7 +116,7 @@ def test_joints_do_not_outrun_their_speed_limits(worlds, physics):
 
 
 def test_the_body_below_the_torso_stands_still(worlds):
-    world = worlds()
+    world = worlds(whole_body=True)
     rng = np.random.default_rng(0)
     commands = PEPPER.clamp(rng.uniform(PEPPER.lower, PEPPER.upper, (60, 10)))
     follow(world, commands)
@@ -175,6 +175,29 @@ def test_one_robot_steps_alike_by_list_and_by_array(worlds):
         world.reset(np.array([0]), PEPPER.rest[None])
         world.advance(command[None])
         assert row == np.hstack([world.pose[0], world.qd[0]]).tolist()
+
+
+def test_what_stands_still_may_be_left_out_and_the_arms_move_alike(worlds):
+    import time
+
+    motion = generate(("pepper",), seed=3, families=("wave",), variants=1).takes[0].frames["pepper"][:60]
+    found, spent = [], []
+    for whole in (True, False):
+        world = worlds(whole_body=whole)
+        for conditions in (MotorConditions(), MotorConditions(payload=0.5)):
+            world.set_conditions(0, conditions)
+            found.append(follow(world, motion)[:, 0])
+        start = time.thread_time()
+        for _ in range(30):
+            world.advance(motion[:1])
+        spent.append(time.thread_time() - start)
+    nominal, loaded = np.abs(found[0] - found[2]), np.abs(found[1] - found[3])
+    n = len(PEPPER.joint_names)
+    assert nominal[:, :n].max() < 2e-3  # rad
+    assert np.abs(nominal[:, n:-n]).max() < 1e-3  # m
+    assert loaded[:, :n].max() < 2e-2
+    assert np.abs(found[0] - found[1]).max() > 1e-4  # the payload is felt
+    assert spent[1] < 0.8 * spent[0]
 
 
 def test_worlds_refuse_what_they_cannot_do(tmp_path):

@@ -192,10 +192,10 @@ def test_signals_end_gently_and_never_between_a_command_and_its_record(
 def test_a_compressed_journal_is_on_the_disk_every_second(tmp_path: Path) -> None:
     program = """
 import numpy as np, os, signal, sys
-from syda_gym.routes.choice import geometric_mapping
+from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.embodiments import catalog
 from syda_gym.teleoperation import Journal, LoopSettings, Tick, TeleoperationLoop
-loop = TeleoperationLoop(geometric_mapping(catalog.get("adult"), catalog.get("pepper")), LoopSettings(calibration=0.0))
+loop = TeleoperationLoop(unfitted(catalog.get("adult"), catalog.get("pepper")), LoopSettings(calibration=0.0))
 journal = Journal(sys.argv[1], loop)
 for index in range(300):
     tick = Tick(index / 30, catalog.get("adult").standing())
@@ -205,9 +205,9 @@ os.kill(os.getpid(), signal.SIGKILL)
     path = tmp_path / "run.jsonl.gz"
     subprocess.run([sys.executable, "-c", program, str(path)], check=False)
     from syda_gym.embodiments import catalog
-    from syda_gym.routes.choice import geometric_mapping
+    from syda_gym.mappings.methods.unfitted import unfitted
 
-    report = replay_journal(path, geometric_mapping(catalog.get("adult"), catalog.get("pepper")))  # type: ignore[arg-type]
+    report = replay_journal(path, unfitted(catalog.get("adult"), catalog.get("pepper")))  # type: ignore[arg-type]
     assert report.exact
     assert report.ticks >= 270, "all but the last second"
     assert "no end mark" in report.damage

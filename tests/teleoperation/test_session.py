@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MotionError, OptionError, TeleoperationError
-from syda_gym.routes.choice import choose_mapping
+from syda_gym.routes.piloting.choice import choose_mapping
 from syda_gym.teleoperation.addresses import make_sink, make_source, read_token
 from syda_gym.teleoperation.incoming.network import UdpSource, WebSocketSource
 from syda_gym.teleoperation.incoming.sources import ReplaySource

@@ -14,10 +14,13 @@ from syda_gym.agents.residual.costs import CostWeights
 from syda_gym.errors import OptionError, StorageError, nearest_name
 from syda_gym.files import asset
 
-__all__ = ["ALGORITHMS", "ResidualConfig", "preset_names"]
+__all__ = ["ALGORITHMS", "STACK", "ResidualConfig", "preset_names"]
 
 ALGORITHMS = ("ppo", "sac", "tqc")
 """PPO and SAC of Stable-Baselines3, TQC of sb3-contrib (extra ``train``)."""
+
+STACK = "stack"
+"""The base of a policy that stands on a predictor, which is trained first, on the tuned Kalman filter."""
 
 _MAX_BYTES = 2**16  # of a configuration file
 
@@ -28,7 +31,7 @@ class ResidualConfig:
 
     Attributes:
         algorithm: one of ``ALGORITHMS``.
-        base: name of the rival below, as in ``classical.RIVALS``.
+        base: name of the rival below, as in ``classical.RIVALS``, or ``STACK``.
         base_settings: of that rival.
         steps: environment steps in all.
         robots: replayed at once.

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from syda_gym.agents.figures import JOINT_WEIGHT
+from syda_gym.agents.figures import JOINT_WEIGHT, Figures
 from syda_gym.errors import OptionError, nearest_name
 
 __all__ = ["CostWeights"]
@@ -36,6 +36,15 @@ class CostWeights:
     def __post_init__(self) -> None:
         if min(self.joints, self.jitter, self.contact) < 0.0 or min(self.margin, self.scale) <= 0.0:
             raise OptionError(f"cost weights must not be negative, margin and scale positive, got {self}")
+
+    def of_figures(self, figures: Figures) -> float:
+        """The mean cost of a step of episodes with these figures: by it the policies of a training are ranked."""
+        return (
+            figures.landmark_mm
+            + self.joints * figures.joint_mrad
+            + self.jitter * figures.jitter
+            + self.contact * figures.contact_steps
+        )
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> CostWeights:

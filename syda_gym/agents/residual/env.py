@@ -1,4 +1,4 @@
-"""ResidualVecEnv: what Stable-Baselines3 trains a residual policy on: recorded streams, servo model, shadow."""
+"""ResidualVecEnv: what Stable-Baselines3 trains a residual policy on: recorded streams, servo model, shadows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from syda_gym.agents.classical.projection import capsule_model
 from syda_gym.agents.interface import Reading
 from syda_gym.agents.learned.policy import feature_count, policy_features
 from syda_gym.agents.residual.costs import CostWeights
-from syda_gym.agents.streams.streams import Streams, read_rows
+from syda_gym.agents.streams.streams import Past, Streams, play_streams, read_rows
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.simulation.making import make_world
 from syda_gym.simulation.rates import Rates
@@ -26,15 +26,16 @@ _DEEPEST = 4.0  # margins of overlap beyond which a contact costs no more
 
 
 class ResidualVecEnv(VecEnv):  # type: ignore[misc]
-    """``B`` robots replay streams under a base agent plus a correction; ``B`` shadows do so without the correction.
+    """``B`` robots replay streams under a base agent plus a correction.
 
-    The reward is the cost that the correction saves against the shadow in the same step, so that its mean says at once
-    whether the policy helps. Actions are corrections in [-1, 1], low-passed and scaled as ``ResidualPolicy`` does it;
-    observations are the features of ``ResidualPolicy``, normalised. An episode ends with its clip, which is truncation.
+    The reward is the cost that the correction saves, in the same step, against a shadow: a robot in the same world that
+    follows the base agent alone. So its mean says at once whether the policy helps. What shadows do follows from the
+    streams, and is played once before. An episode that begins in its middle begins where the shadow is. Actions are
+    corrections in [-1, 1], low-passed and scaled as ``ResidualPolicy`` does it; observations are the features of
+    ``ResidualPolicy``, normalised. An episode ends with its clip, which is truncation.
 
     Args:
-        base: the agent below; a second copy of it drives the shadows.
-        shadow: that copy; must be another object.
+        base: the agent below.
         streams: what is replayed.
         rates: control and physics rate.
         count: number of robots.
@@ -48,7 +49,6 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
     def __init__(
         self,
         base: Agent,
-        shadow: Agent,
         streams: Streams,
         rates: Rates,
         *,
@@ -67,13 +67,12 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
             gymnasium.spaces.Box(-10.0, 10.0, (features,), dtype=np.float32),
             gymnasium.spaces.Box(-1.0, 1.0, (n,), dtype=np.float32),
         )
-        self.agents = (base, shadow)
+        self.base = base
         self.streams, self.rates = streams, rates
         self.scale, self.smoothing, self.weights = scale, smoothing, weights
         self.mean = np.zeros(features) if mean is None else mean
         self.std = np.ones(features) if std is None else std
-        # Learners and shadows live in one world: rows [0, B) and [B, 2B).
-        self.world = make_world(self.interface.robot, rates, count=2 * count, physics="servo")
+        self.world = make_world(self.interface.robot, rates, count=count, physics="servo")
         self._capsules = capsule_model(self.interface.robot) if weights.contact else None
         robot, shape = self.interface.robot, streams.reference.shape
         self._targets = robot.landmarks(streams.reference.reshape(-1, n)).reshape(*shape[:2], -1, 3)
@@ -83,8 +82,10 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
         self._step: NDArray[np.int64] = np.zeros(count, dtype=np.int64)
         self._correction: FloatArray = np.zeros((count, n))
         self._below: FloatArray = np.zeros((count, n))
-        self._shadow_below: FloatArray = np.zeros((count, n))
-        self._trail: FloatArray = np.zeros((4, 2 * count, self._targets.shape[2], 3))
+        self._trail: FloatArray = np.zeros((4, count, self._targets.shape[2], 3))
+        self._past = Past(self.interface, count)
+        self._shadow_q = play_streams(base, streams, rates)
+        self._shadow_cost = self._cost_of_shadows()
         self.rng = np.random.default_rng(0)
 
         self._begin_all()
@@ -105,14 +106,14 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
         self._actions = np.clip(np.asarray(actions, dtype=np.float64), -1.0, 1.0)
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
-        """One control step of learners and shadows."""
+        """One control step."""
         count, n = self.num_envs, self.interface.n
         self._correction = self.smoothing * self._correction + (1.0 - self.smoothing) * self._actions
         below = self._below
-        command = limited(self.interface, below + self.scale * self._correction, below, self.world.pose[:count, :n])
-        self.world.advance(np.concatenate([command, self._shadow_below]))
-        cost = self._cost()
-        reward = (cost[count:] - cost[:count]) / self.weights.scale
+        q = self.world.pose[:, :n]
+        self._past.add(self.streams.base[self._episode, self._step], q)
+        self.world.advance(limited(self.interface, below + self.scale * self._correction, below, q))
+        reward = (self._shadow_cost[self._episode, self._step] - self._cost()) / self.weights.scale
         self._step = self._step + 1
         done = self._step >= self.streams.lengths[self._episode]
         infos: list[dict[str, Any]] = [{} for _ in range(count)]
@@ -143,76 +144,88 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
     def _begin_all(self) -> None:
         """All robots at the start of some episode, all agents without history."""
         count, n = self.num_envs, self.interface.n
-        for agent in self.agents:
-            agent.reset(count)
+        self.base.reset(count)
         self._episode = np.asarray(self.rng.integers(len(self.streams), size=count))
         self._step = np.zeros(count, dtype=np.intp)
         self._correction = np.zeros((count, n))
 
     def _start(self, rows: NDArray[np.intp], steps: NDArray[np.intp]) -> None:
-        """Puts learners ``rows`` and their shadows at rest at a step of their episodes."""
-        count = self.num_envs
+        """Puts robots ``rows`` at rest where the base alone is before a step of their episodes."""
         self._step[rows] = steps
         self._correction[rows] = 0.0
-        both = np.concatenate([rows, rows + count])
-        start = self.streams.base[self._episode[rows], steps]
+        episodes = self._episode[rows]
+        base = self.streams.base[episodes, steps]
+        start = np.where(steps[:, None] > 0, self._shadow_q[episodes, np.maximum(steps - 1, 0)], base)
         if self.streams.motors:
             for row in rows.tolist():
-                for robot in (row, row + count):
-                    self.world.set_conditions(robot, self.streams.motors[self._episode[row]])
-        self.world.reset(both, np.concatenate([start, start]))
-        self._trail[:, both] = self._landmarks()[both]
+                self.world.set_conditions(row, self.streams.motors[self._episode[row]])
+        self.world.reset(rows, start)
+        self._past.begin(rows, base)
+        self._trail[:, rows] = self._landmarks()[rows]
 
     def _finish(self, done: NDArray[np.bool_], infos: list[dict[str, Any]]) -> None:
         """Ends episodes: what was seen last goes to ``infos``, and the next ones begin."""
         rows = np.flatnonzero(done)
-        learner, _ = self._readings()
+        learner = self._reading()
         # The base agent must not be asked twice in one step, so that the raw base command stands in for its answer.
         last = self._normalised(policy_features(self.interface, learner.base, self._correction, learner))
         for row in rows.tolist():
             infos[row] = {"terminal_observation": last[row], "TimeLimit.truncated": True}
         self._episode[rows] = self.rng.integers(len(self.streams), size=len(rows))
         self._start(rows, np.zeros(len(rows), dtype=np.intp))
-        for agent in self.agents:
-            agent.restart(done)
+        self.base.restart(done)
 
     def _observe(self) -> NDArray[np.float32]:
-        """Asks both agents for their commands and returns the learners' features."""
-        learner, shadow = self._readings()
-        self._below = self.agents[0].act_on(learner)
-        self._shadow_below = self.agents[1].act_on(shadow)
+        """Asks the base for its commands and returns the features."""
+        learner = self._reading()
+        self._below = self.base.act_on(learner)
         self.raw_features = policy_features(self.interface, self._below, self._correction, learner)
         return self._normalised(self.raw_features)
 
     def _normalised(self, features: FloatArray) -> NDArray[np.float32]:
         return np.clip((features - self.mean) / self.std, -10.0, 10.0).astype(np.float32)
 
-    def _readings(self) -> tuple[Reading, Reading]:
-        """What learners and shadows read."""
-        count, n = self.num_envs, self.interface.n
-        q, qd = self.world.pose[:, :n], self.world.qd
-        learner, shadow = (
-            read_rows(self.interface, self.streams, self._episode, self._step, q[part], qd[part])
-            for part in (slice(0, count), slice(count, None))
-        )
-        return learner, shadow
+    def _reading(self) -> Reading:
+        """What the robots read."""
+        q, qd = self.world.pose[:, : self.interface.n], self.world.qd
+        return read_rows(self.interface, self.streams, self._episode, self._step, q, qd, self._past.rows)
 
     def _landmarks(self) -> FloatArray:
         n = self.interface.n
-        return np.asarray(self.world.pose[:, n:].reshape(2 * self.num_envs, -1, 3))
+        return np.asarray(self.world.pose[:, n:].reshape(self.num_envs, -1, 3))
 
     def _cost(self) -> FloatArray:
-        """Cost of the step just made, learners first, ``(2 B,)``."""
-        weights, n = self.weights, self.interface.n
-        episode, step = np.tile(self._episode, 2), np.tile(self._step, 2)
-        points, q = self._landmarks(), self.world.pose[:, :n]
+        """Cost of the step just made ``(B,)``."""
+        points, q = self._landmarks(), self.world.pose[:, : self.interface.n]
         self._trail = np.concatenate([self._trail[1:], points[None]])
-        third = self._trail[3] - 3.0 * self._trail[2] + 3.0 * self._trail[1] - self._trail[0]
-        landmark = np.linalg.norm(points - self._targets[episode, step], axis=-1).mean(axis=-1)
-        joint = np.abs(q - self.streams.reference[episode, step]).mean(axis=-1)
+        at = (self._episode, self._step)
+        return self._weighed(points, self._targets[at], _third(self._trail)[0], q, self.streams.reference[at])
+
+    def _cost_of_shadows(self) -> FloatArray:
+        """Cost of every step of every episode under the base alone ``(E, T)``."""
+        q, robot = self._shadow_q, self.interface.robot
+        start = robot.landmarks(self.streams.base[:, 0])[:, None]
+        points = robot.landmarks(q.reshape(-1, q.shape[-1])).reshape(*q.shape[:2], -1, 3)
+        trail = np.concatenate([start, start, start, points], axis=1).swapaxes(0, 1)
+        flat = [array.reshape(-1, *array.shape[2:]) for array in (points, self._targets, _third(trail).swapaxes(0, 1))]
+        joints = [array.reshape(-1, q.shape[-1]) for array in (q, self.streams.reference)]
+        return self._weighed(*flat, *joints).reshape(q.shape[:2])
+
+    def _weighed(
+        self, points: FloatArray, targets: FloatArray, third: FloatArray, q: FloatArray, reference: FloatArray
+    ) -> FloatArray:
+        """Costs ``(N,)`` of steps that led to ``points`` ``(N, P, 3)`` and ``q`` ``(N, n)``."""
+        weights = self.weights
+        landmark = np.linalg.norm(points - targets, axis=-1).mean(axis=-1)
+        joint = np.abs(q - reference).mean(axis=-1)
         jitter = np.linalg.norm(third, axis=-1).mean(axis=-1)
         cost = 1e3 * (landmark + weights.joints * joint + weights.jitter * jitter)
         if self._capsules is not None:
             depth = 1.0 - self._capsules.clearance(q) / weights.margin
             cost = cost + weights.contact * np.clip(depth, 0.0, _DEEPEST)
         return np.asarray(cost)
+
+
+def _third(trail: FloatArray) -> FloatArray:
+    """Third differences along the first axis."""
+    return np.asarray(trail[3:] - 3.0 * trail[2:-1] + 3.0 * trail[1:-2] - trail[:-3])

@@ -18,13 +18,14 @@ from syda_gym.agents.classical.rivals import make_rival
 from syda_gym.agents.figures import Figures
 from syda_gym.agents.learned.policy import ResidualPolicy
 from syda_gym.agents.residual.checkpoint import load_checkpoint, restore_model, save_checkpoint
-from syda_gym.agents.residual.config import ResidualConfig
+from syda_gym.agents.residual.config import STACK, ResidualConfig
 from syda_gym.agents.residual.logs import training_logger
+from syda_gym.agents.residual.normalising import spreads
 from syda_gym.agents.stacks import build_stack, stack_arrays, stack_spec
 from syda_gym.agents.streams.ground import Ground
 from syda_gym.agents.streams.streams import Streams, score_streams
 from syda_gym.envs.task.options import TeleopOptions
-from syda_gym.errors import StorageError
+from syda_gym.errors import OptionError, StorageError
 from syda_gym.locks import locked_folder
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ class Trained:
     Attributes:
         agent: the best policy on the validation streams; the untrained one, which is its base, takes part.
         history: one entry per leg, the untrained policy first.
-        best: index into ``history``.
+        best: index into ``history``; least by the run's own cost.
         config: hyper-parameters.
         seed: of everything.
     """
@@ -63,6 +64,12 @@ class Trained:
     best: int
     config: ResidualConfig
     seed: int
+
+    @property
+    def gained(self) -> bool:
+        """Whether the policy is better than its base on the validation streams, by the run's own cost."""
+        leg, cost = self.history[self.best], self.config.cost
+        return cost.of_figures(leg.policy) < cost.of_figures(leg.base)
 
 
 def train_residual(
@@ -76,6 +83,8 @@ def train_residual(
     base: Agent | None = None,
 ) -> Trained:
     """Trains a residual policy on an environment's motions, mapping and disturbances, in the servo model.
+
+    Every fifth action is kept for validation where there are at least two (``Ground.parts``).
 
     Args:
         options: of the environment, or a ``Ground`` made of them. Keep test motions out with ``clips`` or ``actions``.
@@ -93,9 +102,14 @@ def train_residual(
     """
     ground = options if isinstance(options, Ground) else Ground(options)
     settings = config or ResidualConfig()
+    if base is None and settings.base == STACK:
+        raise OptionError(
+            f"this configuration stands on {STACK!r}, whose predictor is trained first; use "
+            "syda_gym.agents.training.train_stack, or name a base"
+        )
     below = base or make_rival(settings.base, ground.interface, **settings.base_settings)
-    train = ground.record(settings.episodes, seed=2 * seed)
-    validation = ground.record(settings.validation_episodes, seed=2 * seed + 1)
+    train = ground.record_part("train", settings.episodes, seed=2 * seed)
+    validation = ground.record_part("validation", settings.validation_episodes, seed=2 * seed + 1)
     return train_on_streams(
         below, train, validation, ground.rates, settings, seed=seed, folder=folder, resume=resume, progress=progress
     )
@@ -156,7 +170,6 @@ class _Run:
         self.base, self.validation, self.rates = base, validation, rates
         self.config, self.seed, self.folder = config, seed, folder
         self.env: ResidualVecEnv = ResidualVecEnv(
-            _copy(base),
             _copy(base),
             train,
             rates,
@@ -242,7 +255,7 @@ class _Run:
             self.env.step(np.zeros((self.config.robots, self.env.interface.n)))
             seen.append(self.env.raw_features)
         features = np.concatenate(seen)
-        self.env.mean, self.env.std = features.mean(axis=0), np.maximum(features.std(axis=0), 1e-3)
+        self.env.mean, self.env.std = features.mean(axis=0), spreads(features, self.env.interface.n)
 
     def _new_model(self, resumed_at: int | None = None) -> Any:
         from syda_gym.agents.residual.algorithms import new_model
@@ -288,8 +301,7 @@ class _Run:
         save_checkpoint(self.model, self.folder / "checkpoint.safetensors", state, extras)
 
     def _best(self) -> int:
-        weight = self.config.cost.contact
-        return int(np.argmin([leg.policy.objective + weight * leg.policy.contact_steps for leg in self.history]))
+        return int(np.argmin([self.config.cost.of_figures(leg.policy) for leg in self.history]))
 
     def _agent(self, weights: Mapping[str, NDArray[np.float32]]) -> ResidualPolicy:
         ppo = self.config.algorithm == "ppo"

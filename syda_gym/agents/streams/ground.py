@@ -26,25 +26,19 @@ class Ground:
     """What agents are tuned and trained on: an environment's motions, mapping and disturbances, without its physics.
 
     Args:
-        options: of the environment; the first planned route is taken. ``preview`` and ``history`` must be 0.
+        options: of the environment; the first planned route is taken.
 
     Attributes:
         repertoire: clips and base commands.
         interface: of the environment.
-
-    Raises:
-        AgentError: a preview or a history is asked for.
     """
 
     def __init__(self, options: TeleopOptions | Mapping[str, Any]) -> None:
         self.options = options if isinstance(options, TeleopOptions) else TeleopOptions(**options)
-        if self.options.preview or self.options.history:
-            raise AgentError(
-                "agents are trained without preview and history (they keep their own memory); leave both at 0"
-            )
         self.repertoire = Repertoire(self.options)
         self.rates = self.options.rates
-        layout = teleop_layout(self.repertoire.operator, self.repertoire.robot, preview=0, history=0)
+        seen = {"preview": self.options.preview, "history": self.options.history}
+        layout = teleop_layout(self.repertoire.operator, self.repertoire.robot, **seen)
         self.interface = Interface(
             self.repertoire.robot, dict(layout), layout.size, self.rates.dt, self.rates.lag_share
         )
@@ -53,6 +47,25 @@ class Ground:
     def clips(self) -> int:
         """Number of clips."""
         return len(self.repertoire.clips)
+
+    def parts(self) -> dict[str, list[int]]:
+        """Clips to train on and clips to choose by, of different actions: every fifth action is for ``validation``.
+
+        Where there is only one action, both are all clips.
+        """
+        actions = sorted({clip.action for clip in self.repertoire.clips})
+        kept = set(actions[2::5] or actions[-1:]) if len(actions) > 1 else set()
+        numbered = list(enumerate(clip.action for clip in self.repertoire.clips))
+        return {
+            "train": [index for index, action in numbered if action not in kept],
+            "validation": [index for index, action in numbered if action in kept or not kept],
+        }
+
+    def record_part(self, part: str, episodes: int, *, seed: int) -> Streams:
+        """Episodes of one of the ``parts``, spread over all of its clips."""
+        clips = self.parts()[part]
+        spread = np.linspace(0, len(clips) - 1, min(episodes, len(clips))).round().astype(int)
+        return self.record(episodes, clips=[clips[index] for index in spread], seed=seed)
 
     def record(
         self,
@@ -91,7 +104,7 @@ class Ground:
             for at in range(0, count, _CHUNK)
             for part in self._chunk(plays[at : at + _CHUNK], rngs[at : at + _CHUNK], drawn[at : at + _CHUNK])
         ]
-        base, age, reference, operator = (np.stack([part[i] for part in parts]) for i in range(4))
+        base, age, reference, operator, ahead = (np.stack([part[i] for part in parts]) for i in range(5))
         return Streams(
             self.repertoire.limited(base),
             age,
@@ -100,12 +113,13 @@ class Ground:
             tuple(d.motors for d in drawn if d is not None),
             tuple(self.repertoire.clips[clip].name for clip in plays),
             operator,
+            ahead.reshape(*base.shape[:2], -1, base.shape[2]) if self.options.preview else None,
         )
 
     def _chunk(
         self, plays: list[int], rngs: list[np.random.Generator], drawn: list[Drawn | None]
-    ) -> list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
-        """Base, age, reference and operator of some episodes."""
+    ) -> list[tuple[FloatArray, ...]]:
+        """Base, age, reference, operator and preview of some episodes."""
         seen, newest, firsts = [], [], []
         for clip, rng, values in zip(plays, rngs, drawn, strict=True):
             frames, packets, first = self._watch(clip, rng, values)
@@ -142,7 +156,7 @@ class Ground:
         base: FloatArray,
         newest: NDArray[np.intp],
         first: int,
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    ) -> tuple[FloatArray, ...]:
         robot, entry, n = self.repertoire.robot, self.repertoire.clips[clip], self.interface.n
         freeze = 0.0 if drawn is None else drawn.freeze_elbow_yaw
         target = self.repertoire.target_rows(freeze)[entry.rows, :n]
@@ -155,4 +169,6 @@ class Ground:
         def padded(array: FloatArray) -> FloatArray:
             return np.concatenate([array, np.repeat(array[-1:], pad, axis=0)])
 
-        return padded(base[newest - first]), padded(age), padded(target), padded(seen[newest - first])
+        at = newest - first
+        ahead = self.repertoire.base_with_preview(base, at, self.options.preview)[:, n:]
+        return padded(base[at]), padded(age), padded(target), padded(seen[at]), padded(ahead)

@@ -25,7 +25,7 @@ from syda_gym.simulation.capsules import CapsuleModel
 from syda_gym.simulation.making import make_world
 from syda_gym.simulation.rates import Rates
 
-__all__ = ["Streams", "join", "play_streams", "score_streams"]
+__all__ = ["Past", "Streams", "join", "play_streams", "score_streams"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +40,7 @@ class Streams:
         motors: how each robot differs from the nominal one; nominal if empty.
         names: of each episode, for tables.
         operator: newest operator frame at hand ``(E, T, F)``; only needed where an agent reads whole observations.
+        ahead: base commands of the ``k`` steps to come ``(E, T, k, n)`` [rad]; only where a preview is shown.
     """
 
     base: FloatArray
@@ -49,6 +50,7 @@ class Streams:
     motors: tuple[MotorConditions, ...] = ()
     names: tuple[str, ...] = field(default=())
     operator: FloatArray | None = None
+    ahead: FloatArray | None = None
 
     def __post_init__(self) -> None:
         episodes, steps = self.base.shape[:2]
@@ -76,6 +78,7 @@ class Streams:
             tuple(self.motors[i] for i in index) if self.motors else (),
             tuple(self.names[i] for i in index) if self.names else (),
             None if self.operator is None else self.operator[index],
+            None if self.ahead is None else self.ahead[index],
         )
 
     @property
@@ -101,6 +104,7 @@ def join(parts: Sequence[Streams]) -> Streams:
         tuple(m for p in parts for m in (p.motors or (MotorConditions(),) * len(p))) if with_motors else (),
         tuple(name for part in parts for name in (part.names or ("",) * len(part))),
         None if any(p.operator is None for p in parts) else np.concatenate([padded(p.operator) for p in parts]),
+        None if any(p.ahead is None for p in parts) else np.concatenate([padded(p.ahead) for p in parts]),
     )
 
 
@@ -129,21 +133,48 @@ def play_streams(agent: Agent, streams: Streams, rates: Rates) -> FloatArray:
     agent.reset(episodes)
     result = np.empty_like(streams.base)
     n = interface.n
+    past = Past(interface, episodes)
+    past.begin(np.arange(episodes), streams.base[:, 0])
     for t in range(steps):
-        command = agent.act_on(read_stream(interface, streams, t, world.pose[:, :n], world.qd))
+        q = world.pose[:, :n]
+        command = agent.act_on(read_stream(interface, streams, t, q, world.qd, past.rows))
+        past.add(streams.base[:, t], q)
         world.advance(command)
         result[:, t] = world.pose[:, :n]
     world.close()
     return result
 
 
-def read_stream(interface: Interface, streams: Streams, t: int, q: FloatArray, qd: FloatArray) -> Reading:
+def read_stream(
+    interface: Interface, streams: Streams, t: int, q: FloatArray, qd: FloatArray, past: FloatArray | None = None
+) -> Reading:
     """The reading of step ``t`` of every episode, with the observation that the environment would show.
 
-    Blocks that a stream does not hold (a preview, histories, the previous action) are zero.
+    Blocks that a stream does not hold (the previous action; a preview or histories that were not recorded) are zero.
     """
     rows = np.arange(len(streams))
-    return read_rows(interface, streams, rows, np.full(len(rows), t), q, qd)
+    return read_rows(interface, streams, rows, np.full(len(rows), t), q, qd, past)
+
+
+class Past:
+    """The last base commands and joint angles of robots, as the environment keeps them for its histories.
+
+    Attributes:
+        rows: ``(B, 2, h, n)`` [rad]: base commands, then joint angles; the newest first. ``h`` may be 0.
+    """
+
+    def __init__(self, interface: Interface, count: int) -> None:
+        block = interface.layout.get("base_history", slice(0, 0))
+        self.rows = np.zeros((count, 2, (block.stop - block.start) // interface.n, interface.n))
+
+    def begin(self, which: NDArray[np.intp], base: FloatArray) -> None:
+        """Robots ``which`` begin an episode at rest at ``base`` ``(k, n)`` [rad]."""
+        self.rows[which] = base[:, None, None]
+
+    def add(self, base: FloatArray, q: FloatArray) -> None:
+        """What was asked for and where the joints were before the step that is made now, ``(B, n)`` each."""
+        if self.rows.shape[2]:
+            self.rows = np.concatenate([np.stack([base, q], axis=1)[:, :, None], self.rows[:, :, :-1]], axis=2)
 
 
 def read_rows(
@@ -153,18 +184,29 @@ def read_rows(
     steps: NDArray[np.integer[Any]],
     q: FloatArray,
     qd: FloatArray,
+    past: FloatArray | None = None,
 ) -> Reading:
-    """The reading of step ``steps[i]`` of episode ``episodes[i]`` for robots ``i`` at ``q`` ``(B, n)``."""
+    """The reading of step ``steps[i]`` of episode ``episodes[i]`` for robots ``i`` at ``q`` ``(B, n)``.
+
+    ``past`` are the rows of ``Past``, where the layout has histories.
+    """
     base, age = streams.base[episodes, steps], streams.age[episodes, steps]
     layout = interface.layout
     observation = np.zeros((len(q), interface.size))
+    preview = base[:, None]
+    if streams.ahead is not None:
+        preview = np.concatenate([preview, streams.ahead[episodes, steps]], axis=1)
     error = layout["base_error"].start
-    observation[:, error : error + interface.n] = base - q
+    shown = (preview - q[:, None]).reshape(len(q), -1)
+    observation[:, error : error + shown.shape[1]] = shown
+    if past is not None and past.shape[2]:
+        apart = (past - q[:, None, None]).reshape(len(q), 2, -1)
+        observation[:, layout["base_history"]], observation[:, layout["q_history"]] = apart[:, 0], apart[:, 1]
     observation[:, layout["q"]], observation[:, layout["qd"]] = q, qd
     observation[:, layout["packet_age"].start] = age
     if streams.operator is not None and "operator" in layout:
         observation[:, layout["operator"]] = streams.operator[episodes, steps]
-    return Reading(base=base, preview=base[:, None], q=q, qd=qd, age=age, observation=observation)
+    return Reading(base=base, preview=preview, q=q, qd=qd, age=age, observation=observation)
 
 
 def score_streams(

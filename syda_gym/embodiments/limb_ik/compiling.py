@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
 from typing import Any, TypeVar
 
 import numba
 
-__all__ = ["compiled", "copy"]
+__all__ = ["compiled", "copy", "first_call"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -23,6 +27,38 @@ def compiled(function: Function) -> Function:
     except RuntimeError:  # no folder can be written: compile in every process
         made = numba.njit(error_model="numpy")(function)
     return made
+
+
+def first_call(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Calls a compiled function; if that compiles it, Ctrl-C and a request to terminate wait until it is done.
+
+    LLVM calls back into Python while it compiles, where an exception is lost and leaves half a function.
+    """
+    if function.signatures:  # type: ignore[attr-defined]
+        return function(*arguments)
+    with _undisturbed():
+        return function(*arguments)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():  # signals are another thread's
+        yield
+        return
+    waiting: list[int] = []
+
+    def wait(number: int, frame: FrameType | None) -> None:
+        waiting.append(number)
+
+    names = [name for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {name: signal.signal(getattr(signal, name), wait) for name in names}
+    try:
+        yield
+    finally:
+        for name, handler in before.items():
+            signal.signal(getattr(signal, name), handler or signal.SIG_DFL)
+        for number in waiting[-1:]:
+            signal.raise_signal(number)
 
 
 @compiled

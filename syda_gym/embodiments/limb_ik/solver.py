@@ -61,11 +61,8 @@ class LimbIK:
     """
 
     def __init__(self, robot: Robot, habits: Habits | None = None) -> None:
-        from syda_gym.embodiments.limb_ik import kernel  # numba is imported where arms are solved, not before
-
         self.robot = robot
         self.arms = tuple(of_robot(robot, index, habits or Habits()) for index in range(len(robot.chains)))
-        self._kernel: Any = kernel
         inside = [range(part.start, part.stop) for part in robot.arm_slices]
         self._across = any(not any(row[0] in arm and row[1] in arm for arm in inside) for row in robot._coupled)
 
@@ -98,7 +95,7 @@ class LimbIK:
         frames = np.empty((len(unit), self.robot.n_features))
         for index, (arm, part) in enumerate(zip(self.arms, self.robot.arm_slices, strict=True)):
             angles = np.empty((len(unit), len(arm.lower)))
-            self._kernel.solve(arm, np.ascontiguousarray(unit[:, index]).reshape(-1, 6), angles)
+            _call("solve", arm, np.ascontiguousarray(unit[:, index]).reshape(-1, 6), angles)
             frames[:, part] = angles
         return self.robot.clamp(frames) if self._across else frames
 
@@ -134,7 +131,7 @@ class LimbIK:
                 f"{self.robot.name!r} needs {self.state_size} for each of {count} sequences"
             )
         steps = np.array(
-            np.broadcast_to(np.asarray(self._kernel.FRAME if dt is None else dt, dtype=np.float64), (count, length))
+            np.broadcast_to(np.asarray(_kernel().FRAME if dt is None else dt, dtype=np.float64), (count, length))
         )
         if not (np.isfinite(steps).all() and (steps > 0.0).all()):
             raise EmbodimentError("the time between frames must be positive and finite")
@@ -144,7 +141,7 @@ class LimbIK:
             last = first + 2 * len(arm.lower) + 3
             own, angles = np.ascontiguousarray(numbers[:, first:last]), np.empty((count, length, len(arm.lower)))
             wanted = np.ascontiguousarray(unit[:, :, index]).reshape(count, length, 6)
-            self._kernel.follow(arm, wanted, steps, limited and dt is not None, state.fresh, own, angles)
+            _call("follow", arm, wanted, steps, limited and dt is not None, state.fresh, own, angles)
             numbers[:, first:last], frames[:, :, part], first = own, angles, last
         if self._across:
             frames = self.robot.clamp(frames.reshape(-1, frames.shape[2])).reshape(frames.shape)
@@ -172,3 +169,16 @@ class LimbIK:
             raise EmbodimentError(f"directions for {self.robot.name!r} must be finite and longer than zero")
         unit: FloatArray = wanted / length
         return unit
+
+
+def _kernel() -> Any:
+    """The compiled part; numba is imported where arms are solved, not before."""
+    from syda_gym.embodiments.limb_ik import kernel
+
+    return kernel
+
+
+def _call(name: str, *arguments: Any) -> None:
+    from syda_gym.embodiments.limb_ik.compiling import first_call
+
+    first_call(getattr(_kernel(), name), *arguments)

@@ -65,6 +65,7 @@ class TeleopOptions:
     physics_hz: float = 240.0
     physics: str = "bullet"
     self_collision: bool = False
+    whole_body: bool = False
     reward: RewardWeights | Dict[str, Any] | None = None
     terminate_error: float | None = None
     success_error: float = 0.1
@@ -92,8 +93,9 @@ class TeleopOptions:
         _check_number("success_error", self.success_error, 1e-4, 10.0)
         if self.terminate_error is not None:
             _check_number("terminate_error", self.terminate_error, 1e-4, 10.0)
-        if not isinstance(self.self_collision, bool | np.bool_):
-            raise OptionError(f"self_collision must be True or False, got {self.self_collision!r}")
+        for name in ("self_collision", "whole_body"):
+            if not isinstance(getattr(self, name), bool | np.bool_):
+                raise OptionError(f"{name} must be True or False, got {getattr(self, name)!r}")
         if self.self_collision and self.physics == "servo":
             raise OptionError("physics='servo' knows no contacts; use physics='bullet' or self_collision=False")
         if not isinstance(self.held_out, Sequence) or isinstance(self.held_out, str):

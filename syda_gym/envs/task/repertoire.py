@@ -24,7 +24,7 @@ from syda_gym.errors import EmbodimentError, MappingError, MotionError, OptionEr
 from syda_gym.mappings.limits import limit_speed, step_towards
 from syda_gym.motions.clip import MotionClip, Motions, Take
 from syda_gym.motions.loading import load_motions, resampled
-from syda_gym.routes.pilot import Pilot, PlannedRoute
+from syda_gym.routes.piloting.pilot import Pilot, PlannedRoute
 
 __all__ = ["ClipEntry", "Repertoire"]
 

@@ -13,6 +13,7 @@ from syda_gym.agents.learned.policy import ResidualPolicy, feature_count
 from syda_gym.agents.residual.config import ResidualConfig, preset_names
 from syda_gym.agents.residual.env import ResidualVecEnv
 from syda_gym.agents.residual.residual_training import train_residual
+from syda_gym.agents.streams.ground import Ground
 from syda_gym.agents.streams.streams import play_streams
 from syda_gym.errors import AgentError, OptionError, StorageError
 
@@ -68,14 +69,16 @@ def test_the_correction_is_low_passed(ground):
         previous = policy._correction.copy()
 
 
-def test_the_training_environment_plays_a_policy_as_the_agent_itself_does(ground):
+@pytest.mark.parametrize("seen", [{}, {"preview": 2, "history": 2}])
+def test_the_training_environment_plays_a_policy_as_the_agent_itself_does(tiny_options, seen):
+    ground = Ground({**tiny_options, **seen})
     streams = ground.record(3, seed=5)
     interface = ground.interface
     for name in ("base", "kalman"):
         policy = random_policy(interface, make_rival(name, interface), size=0.03, smoothing=0.5)
         expected = play_streams(policy, streams, ground.rates)
         env = ResidualVecEnv(
-            make_rival(name, interface), make_rival(name, interface), streams, ground.rates,
+            make_rival(name, interface), streams, ground.rates,
             count=3, scale=policy.scale, smoothing=policy.smoothing, weights=TINY.cost,
         )  # fmt: skip
         env._begin_all()
@@ -90,23 +93,44 @@ def test_the_training_environment_plays_a_policy_as_the_agent_itself_does(ground
             )  # float32 observations
 
 
-def test_no_correction_earns_exactly_nothing_and_a_shadow_of_the_reference_earns(ground):
+def test_no_correction_earns_nothing_and_a_shadow_of_the_reference_earns(ground):
     streams = ground.record(4, seed=6)
     interface = ground.interface
     env = ResidualVecEnv(
-        BaseAlone(interface), BaseAlone(interface), streams, ground.rates,
+        BaseAlone(interface), streams, ground.rates,
         count=4, scale=0.25, smoothing=0.0, weights=TINY.cost,
     )  # fmt: skip
     env.reset()
+    whole = np.zeros(4, dtype=bool)  # robots whose episode began at its beginning
     for _ in range(200):
-        _, reward, _, _ = env.step(np.zeros((4, interface.n)))
-        assert np.array_equal(reward, np.zeros(4))
+        _, reward, done, _ = env.step(np.zeros((4, interface.n)))
+        assert np.allclose(reward[whole], 0.0, atol=1e-9)
+        whole |= done
+    assert whole.all()
     earned = 0.0
     for _ in range(100):
         reference = streams.reference[env._episode, env._step]
         _, reward, _, _ = env.step(np.clip((reference - env._below) / 0.25, -1, 1))
         earned += reward.mean()
     assert earned > 0.0
+
+
+def test_no_feature_saturates_once_the_policy_corrects(ground):
+    """Under the base alone the spread of the corrections is 0; a tenth of one used to be off the scale."""
+    trained = train_residual(ground, ResidualConfig.of({**TINY.as_dict(), "legs": 1, "steps": 256}), seed=0)
+    n = ground.interface.n
+    std, mean = trained.agent.std, trained.agent.mean
+    assert (std >= 0.05).all()
+    for correction in (0.1, 0.9):
+        assert (np.abs((correction - mean[-n:]) / std[-n:]) < 2.0).all()
+
+
+def test_the_best_policy_is_chosen_by_the_runs_own_cost(ground):
+    smooth = ResidualConfig.of({**TINY.as_dict(), "cost": {"joints": 0.0, "jitter": 1000.0}})
+    trained = train_residual(ground, smooth, seed=0)
+    costs = [leg.policy.landmark_mm + 1000.0 * leg.policy.jitter for leg in trained.history]
+    assert trained.best == int(np.argmin(costs))
+    assert trained.gained == (min(costs) < costs[0])
 
 
 def test_same_seed_same_weights_bit_for_bit(ground):

@@ -26,7 +26,7 @@ def error_of(mapping, pair: PairedMotions) -> float:
     return float(landmark_error(pair.target_body, mapping(pair.source), pair.target).mean())
 
 
-def test_shrunk_without_end_it_is_the_rotated_geometric_mapping(adult_pepper):
+def test_shrunk_without_end_it_is_the_rotated_unfitted(adult_pepper):
     hard = fit(adult_pepper, shrinkage=1e9, lag=0, confidence=False)
     assert isinstance(hard.regressor.main, PriorRegressor)  # type: ignore[attr-defined]
     codes = hard.source_coder.encode(adult_pepper.source)

@@ -12,9 +12,9 @@ import pytest
 
 from syda_gym.embodiments import catalog
 from syda_gym.errors import MotionError, OptionError, TeleoperationError
+from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.motions.film.pictures import Shot
 from syda_gym.motions.film.pose_model import Picture, Pose
-from syda_gym.routes.choice import geometric_mapping
 from syda_gym.teleoperation import LoopSettings, MemorySink, TeleoperationLoop, run
 from syda_gym.teleoperation.addresses import make_source
 from syda_gym.teleoperation.incoming.camera import CameraSource, FilmSource
@@ -170,7 +170,7 @@ class TestHolding:
             pose.world[15] = (0.6, -0.4, 0.0)
             return pose
 
-        loop = TeleoperationLoop(geometric_mapping(ADULT, catalog.get("pepper")), LoopSettings(calibration=0.0))
+        loop = TeleoperationLoop(unfitted(ADULT, catalog.get("pepper")), LoopSettings(calibration=0.0))
         sink = MemorySink()
 
         def watch(decision: object) -> None:
@@ -189,7 +189,7 @@ class TestHolding:
 
 class TestFilm:
     def test_a_film_drives_simulated_commands(self, person_film: Path, pose_model: Path) -> None:
-        loop = TeleoperationLoop(geometric_mapping(ADULT, catalog.get("pepper")), LoopSettings(calibration=0.5))
+        loop = TeleoperationLoop(unfitted(ADULT, catalog.get("pepper")), LoopSettings(calibration=0.5))
         sink = MemorySink()
         with FilmSource(ADULT, person_film, stand=0.7) as source:
             statistics = run(source, loop, sink, rest_at_end=False)

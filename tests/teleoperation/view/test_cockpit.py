@@ -12,9 +12,9 @@ import pytest
 
 from syda_gym.embodiments import catalog
 from syda_gym.errors import OptionError
+from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.motions import load_motions
 from syda_gym.motions.film.pose_model import Pose
-from syda_gym.routes.choice import geometric_mapping
 from syda_gym.teleoperation import LoopSettings, MemorySink, ReplaySource, State, TeleoperationLoop, run
 from syda_gym.teleoperation.incoming.camera import CameraSource, Look
 from syda_gym.teleoperation.live_statistics import LiveStatistics
@@ -32,7 +32,7 @@ def waving() -> list[Any]:
 
 def made(tmp_path: Path, source: Any = None, sink: Any = None, **options: Any) -> Cockpit:
     """A cockpit whose page is not opened."""
-    loop = TeleoperationLoop(geometric_mapping(ADULT, PEPPER), LoopSettings(calibration=0.0))
+    loop = TeleoperationLoop(unfitted(ADULT, PEPPER), LoopSettings(calibration=0.0))
     return Cockpit(
         loop, source or ReplaySource(waving()), sink or MemorySink(), LiveStatistics(), folder=tmp_path, **options
     )

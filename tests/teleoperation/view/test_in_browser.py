@@ -13,8 +13,8 @@ import pytest
 from PIL import Image
 
 from syda_gym.embodiments import catalog
+from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.motions import load_motions
-from syda_gym.routes.choice import geometric_mapping
 from syda_gym.teleoperation import LoopSettings, ReplaySource, State, TeleoperationLoop, run
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.outgoing.bullet import BulletSink
@@ -63,7 +63,7 @@ def running() -> Iterator[tuple[TeleoperationLoop, Cockpit]]:
     """Pepper follows a waving adult until the test ends."""
     adult, pepper = catalog.get("adult"), catalog.get("pepper")
     clips = [clip for clip in load_motions("embedded").clips("adult") if clip.action == "wave_both"][:1]
-    loop = TeleoperationLoop(geometric_mapping(adult, pepper), LoopSettings(calibration=0.0))
+    loop = TeleoperationLoop(unfitted(adult, pepper), LoopSettings(calibration=0.0))
     source, sink, stats = ReplaySource(clips, repeat=True), BulletSink(pepper), LiveStatistics()
     with sink, Cockpit(loop, source, sink, stats) as cockpit, source:
         thread = threading.Thread(

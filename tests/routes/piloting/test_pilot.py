@@ -16,9 +16,9 @@ from syda_gym.errors import MotionError, OptionError, RouteError, StorageError
 from syda_gym.motions import write_dataset
 from syda_gym.motions.clip import Motions, Take
 from syda_gym.motions.recordings import joined, new_recording, recorded, recordings_folder
-from syda_gym.routes.choice import choose_mapping
-from syda_gym.routes.own import fit_own
-from syda_gym.routes.pilot import Pilot
+from syda_gym.routes.piloting.choice import choose_mapping
+from syda_gym.routes.piloting.own import fit_own
+from syda_gym.routes.piloting.pilot import Pilot
 from tests.mappings.conftest import make_pair
 
 

@@ -16,7 +16,7 @@ from syda_gym.mappings.storage import save_mapping
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import FORMATS, load_motions, resampled
 from syda_gym.motions.recordings import joined, recorded, recordings_folder
-from syda_gym.routes.links import FIT_FPS, own_mappings_folder
+from syda_gym.routes.piloting.links import FIT_FPS, own_mappings_folder
 
 __all__ = ["OwnFit", "fit_own"]
 

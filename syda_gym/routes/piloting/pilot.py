@@ -21,8 +21,8 @@ from syda_gym.motions.clip import Motions
 
 if TYPE_CHECKING:
     from syda_gym.mappings.mapping import Mapping
-    from syda_gym.routes.links import Links
     from syda_gym.routes.measured import MeasuredBodies
+    from syda_gym.routes.piloting.links import Links
     from syda_gym.routes.route import Route
 
 __all__ = ["AUTO", "Pilot", "PlannedRoute"]
@@ -106,7 +106,7 @@ class Pilot:
         if isinstance(mapping, Mapping):
             self._take(mapping)
         elif isinstance(mapping, str | os.PathLike) and Path(mapping).is_dir():
-            from syda_gym.routes.links import StoredLinks
+            from syda_gym.routes.piloting.links import StoredLinks
 
             self._links = StoredLinks(Path(mapping))
         else:
@@ -153,7 +153,7 @@ class Pilot:
             clips: frames ``(N, F)`` of the operator.
             fps: of the clips.
         """
-        from syda_gym.routes.dry_run.per_motion import routes_for_clips
+        from syda_gym.routes.piloting.per_motion import routes_for_clips
 
         names = [route.bodies for route in routes]
         bodies = {name: self._body(name) for route in names for name in route}
@@ -180,7 +180,7 @@ class Pilot:
         self, method: str | None, preset: str | None, held_out: tuple[str, ...], via: Sequence[str] | None, seed: int
     ) -> None:
         """Links from the motions if they lead to the robot, else this user's own, else the unfitted mapping."""
-        from syda_gym.routes.links import OwnLinks, RecordedLinks
+        from syda_gym.routes.piloting.links import OwnLinks, RecordedLinks
 
         motions = self.motions
         if motions is not None:

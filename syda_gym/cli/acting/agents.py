@@ -2,131 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
-from functools import wraps
-from inspect import Parameter, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from syda_gym.cli import checks
-from syda_gym.cli.names import ALGORITHMS, CONFIGS, KINDS, PHYSICS, REFERENCES, ticked
+from syda_gym.cli.acting.figures import print_figures
+from syda_gym.cli.acting.scene import Scene, with_scene
+from syda_gym.cli.names import ALGORITHMS, CONFIGS, KINDS, PHYSICS, STACK, ticked
 from syda_gym.cli.options import (
     AGENT_HELP,
     DEFAULT_VIEW,
     AppearanceOption,
-    DisturbancesOption,
-    HeldOutOption,
     JsonOption,
-    MappingOption,
-    MethodOption,
-    MotionsOption,
-    OperatorOption,
     PhysicsHzOption,
-    PresetOption,
-    RobotOption,
-    RouteOption,
     SeedOption,
     ViewAddressOption,
     ViewOption,
-    ends_of,
-    mapping_of,
-    route_of,
 )
-from syda_gym.cli.shared import bar, interruptible, print_json, say_written, show_table
+from syda_gym.cli.shared import bar, console, interruptible, print_json, say_written
 
 if TYPE_CHECKING:
-    from syda_gym.agents.figures import Figures
+    from syda_gym.agents.work import TrainingReport
 
 __all__ = ["evaluate", "export", "play", "train"]
-
-
-@dataclass(frozen=True)
-class Scene:
-    """The environment that a command acts in, as its user described it; the fields are options of the command."""
-
-    motions: MotionsOption = "embedded"
-    operator: OperatorOption = None
-    robot: RobotOption = None
-    route: RouteOption = "auto"
-    method: MethodOption = None
-    preset: PresetOption = None
-    mapping: MappingOption = None
-    disturbances: DisturbancesOption = "none"
-    reference: Annotated[
-        str,
-        typer.Option(
-            help="What errors are measured against: `paired`, the robot's own motion, or `mapped`, the clean mapping.",
-            callback=checks.one_of(REFERENCES, "reference"),
-        ),
-    ] = "paired"
-    held_out: HeldOutOption = None
-
-    def options(self, *, training: bool = False) -> dict[str, Any]:
-        """Environment options; held-out actions are kept out of fits and, if ``training``, out of the motions."""
-        mapping, preset = mapping_of(self.method, self.preset, self.mapping)
-        operator, robot = ends_of(self.operator, self.robot, self.route)
-        options: dict[str, Any] = {
-            "motions": self.motions,
-            "operator": operator,
-            "robot": robot,
-            "route": route_of(self.route),
-            "mapping": _stored(mapping),
-            "preset": preset,
-            "disturbances": None if self.disturbances == "none" else self.disturbances,
-            "reference": self.reference,
-        }
-        if self.held_out:
-            known = _actions(self.motions, self.held_out)
-            options["held_out"] = tuple(self.held_out)
-            options["actions"] = tuple(sorted(known - set(self.held_out)) if training else self.held_out)
-        return options
-
-
-def _stored(mapping: str) -> Any:
-    """A stored mapping if one file is named; a method or a folder as it is."""
-    if not Path(mapping).is_file():
-        return mapping
-    from syda_gym.mappings.storage import load_mapping
-
-    return load_mapping(mapping)
-
-
-def _actions(motions: str, names: Sequence[str]) -> set[str]:
-    """All actions of the motions, if the named ones are among them."""
-    from syda_gym.errors import nearest_name
-    from syda_gym.motions.loading import load_motions
-
-    known = {take.action for take in load_motions(motions).takes}
-    for name in names:
-        if name not in known:
-            raise typer.BadParameter(
-                f"{motions} has no action {name!r}; {nearest_name(name, known)}", param_hint="'--held-out'"
-            )
-    return known
-
-
-def with_scene(command: Callable[..., None]) -> Callable[..., None]:
-    """Gives a command that takes ``scene`` the options of a ``Scene`` in its place."""
-    hints = get_type_hints(Scene, include_extras=True)
-    scene = [
-        Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default, annotation=hints[field.name])
-        for field in fields(Scene)
-    ]
-    own = signature(command, eval_str=True)
-
-    @wraps(command)
-    def run(**given: Any) -> None:
-        command(scene=Scene(**{field.name: given.pop(field.name) for field in fields(Scene)}), **given)
-
-    kept = [parameter for name, parameter in own.parameters.items() if name != "scene"]
-    parameters = [*(parameter.replace(kind=Parameter.KEYWORD_ONLY) for parameter in kept), *scene]
-    # Typer reads both.
-    run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return run
 
 
 @with_scene
@@ -144,11 +44,12 @@ def train(
     config: Annotated[
         str,
         typer.Option(
-            help=f"Hyper-parameters of the residual policy: {ticked(CONFIGS)}, or a YAML file of your own.",
+            help=f"Hyper-parameters of the residual policy: {ticked(CONFIGS)}, or a YAML file of your own. Default: "
+            "`undisturbed` without disturbances, else `teleop`.",
             metavar="NAME|FILE",
             callback=checks.named_or_file(CONFIGS, "training configuration", ".yaml", ".yml"),
         ),
-    ] = "undisturbed",
+    ] = "",
     algorithm: Annotated[
         str,
         typer.Option(
@@ -158,26 +59,35 @@ def train(
     ] = "",
     steps: Annotated[int, typer.Option(help="Environment steps, or iterations; 0 for the configuration's.", min=0)] = 0,
     base: Annotated[
-        str, typer.Option(help=f"What it stands on: {AGENT_HELP}", metavar="AGENT", callback=checks.agents)
-    ] = "base",
+        str,
+        typer.Option(
+            help="What it stands on. Default: what the configuration names, as a rule `stack`: a predictor, trained "
+            f"first, on the Kalman filter tuned for the disturbances. {AGENT_HELP}",
+            metavar="AGENT",
+            callback=checks.agents_or(STACK),
+        ),
+    ] = "",
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
     seed: SeedOption = 0,
     *,
     scene: Scene,
 ) -> None:
-    """Train a residual policy or a predictor, beside what it stands on."""
+    """Train a residual policy or a predictor, beside base, lead, tuned Kalman filter and what it stands on."""
     from syda_gym.agents.predictor.predictor_training import PredictorConfig
     from syda_gym.agents.residual.config import ResidualConfig
-    from syda_gym.agents.work import train_agent
+    from syda_gym.agents.work import default_config, train_agent
 
+    options = scene.options(training=True)
     settings: Any
     if kind == "predictor":
         settings = PredictorConfig(iterations=steps) if steps else PredictorConfig()
     else:
         changes: dict[str, Any] = {"algorithm": algorithm} if algorithm else {}
-        make = ResidualConfig.preset if config in CONFIGS else ResidualConfig.read
-        settings = make(config, **changes, **({"steps": steps} if steps else {}))
-    options = scene.options(training=True)
+        changes |= {"steps": steps} if steps else {}
+        if config:
+            settings = (ResidualConfig.preset if config in CONFIGS else ResidualConfig.read)(config, **changes)
+        else:
+            settings = ResidualConfig.of({**default_config(options).as_dict(), **changes})
     with interruptible(lambda: _where_to_go_on(out, kind)), bar("Training") as tell:
         report = train_agent(options, out, config=settings, base=base, seed=seed, resume=resume, progress=tell)
     rows = {}
@@ -185,8 +95,10 @@ def train(
         mark = "  (kept)" if place == report.best else ""
         rows[f"after {step}{mark}"] = figures
         last = below
-    _print_figures({"what it stands on": last, **rows}, "Validation episodes, servo model")
+    print_figures({"what it stands on": last, **rows}, "Validation episodes, servo model")
+    print_figures(report.comparison.figures, "The same episodes, beside the others")
     say_written("stored", report.bundle, f"(logs and checkpoint beside it; tensorboard --logdir {out})")
+    _print_verdict(report)
 
 
 @with_scene
@@ -222,9 +134,7 @@ def evaluate(
     if as_json:
         print_json({"episodes": count, "agents": {name: figures.as_dict() for name, figures in means.items()}})
         return
-    _print_figures(
-        means, f"Means over {count} episode{'s' * (count > 1)}, {physics}, disturbances {scene.disturbances}"
-    )
+    print_figures(means, f"Means over {count} episode{'s' * (count > 1)}, {physics}, disturbances {scene.disturbances}")
 
 
 @with_scene
@@ -253,12 +163,12 @@ def play(
         with bar("Playing") as tell:
             played = play_episode(options, agent, clip=int(clip) if clip.isdigit() else clip, seed=seed)
             tell(1.0)
-        _print_figures({agent: played.figures}, f"Clip {clip}")
+        print_figures({agent: played.figures}, f"Clip {clip}")
         view_episode(played, f"{agent}, clip {clip}", view_address, appearance)
         return
     with interruptible("no film was written; run the command again"), bar("Filming") as tell:
         figures = film(options, agent, out, clip=int(clip) if clip.isdigit() else clip, seed=seed, progress=tell)
-    _print_figures({agent: figures}, f"Clip {clip}")
+    print_figures({agent: figures}, f"Clip {clip}")
     say_written("video", out)
 
 
@@ -284,22 +194,33 @@ def export(
     say_written("card of its inputs and outputs", f"{out}.json")
 
 
-def _print_figures(rows: Mapping[str, Figures], title: str) -> None:
-    from syda_gym.agents.figures import OBJECTIVE
-
-    headings = ("agent", "landmark error [mm]", "joint error [mrad]", "jitter [mm/frame³]", "contacts [%]", "J")
-    cells = (
-        (
-            name,
-            f"{figures.landmark_mm:.2f}",
-            f"{figures.joint_mrad:.2f}",
-            f"{figures.jitter:.2f}",
-            f"{100 * figures.contact_steps:.1f}",
-            f"{figures.objective:.2f}",
+def _print_verdict(report: TrainingReport) -> None:
+    """Whether anything was gained, by the run's own cost, and against the best of the others."""
+    comparison, say = report.comparison, console()
+    if report.best == 0:
+        say.print(
+            f"nothing was gained: the base is kept; try {advice(comparison.best_other)}",
+            style="bold red", markup=False, soft_wrap=True,
+        )  # fmt: skip
+        return
+    mine, other = (comparison.cost.of_figures(comparison.figures[n]) for n in (comparison.mine, comparison.best_other))
+    if comparison.gained:
+        words = (
+            f"gained: cost {mine:.2f}, {100 * (1 - mine / other):.1f} % less than the best of the others "
+            f"({comparison.best_other}, {other:.2f})"
         )
-        for name, figures in rows.items()
-    )
-    show_table(headings, cells, title=title, note=OBJECTIVE)
+        say.print(words, style="bold green", markup=False, soft_wrap=True)
+    else:
+        words = (
+            f"{comparison.best_other!r} is better without training ({other:.2f} against {mine:.2f}); take it, or try "
+            "--base stack or more --steps"
+        )
+        say.print(words, style="bold red", markup=False, soft_wrap=True)
+
+
+def advice(best: str) -> str:
+    """What to try after a training that gained nothing."""
+    return f"more --steps, another --seed, --base stack, or take `{best}`, the best of the others, as it is"
 
 
 def _where_to_go_on(out: Path, kind: str) -> str:

@@ -13,7 +13,7 @@ from syda_gym.errors import TeleoperationError
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
-from syda_gym.routes.pilot import AUTO, Pilot
+from syda_gym.routes.piloting.pilot import AUTO, Pilot
 
 __all__ = ["choose_mapping"]
 

@@ -1,0 +1,126 @@
+"""Scene: the options by which ``train``, ``tune``, ``evaluate`` and ``play`` describe their environment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from functools import wraps
+from inspect import Parameter, signature
+from pathlib import Path
+from typing import Annotated, Any, get_type_hints
+
+import typer
+
+from syda_gym.cli import checks
+from syda_gym.cli.names import REFERENCES
+from syda_gym.cli.options import (
+    DisturbancesOption,
+    HeldOutOption,
+    MappingOption,
+    MethodOption,
+    MotionsOption,
+    OperatorOption,
+    PresetOption,
+    RobotOption,
+    RouteOption,
+    ends_of,
+    mapping_of,
+    route_of,
+)
+
+__all__ = ["Scene", "with_scene"]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The environment that a command acts in, as its user described it; the fields are options of the command."""
+
+    motions: MotionsOption = "embedded"
+    operator: OperatorOption = None
+    robot: RobotOption = None
+    route: RouteOption = "auto"
+    method: MethodOption = None
+    preset: PresetOption = None
+    mapping: MappingOption = None
+    disturbances: DisturbancesOption = "none"
+    reference: Annotated[
+        str,
+        typer.Option(
+            help="What errors are measured against: `mapped`, what the mapping makes of the undisturbed operator, "
+            "which an agent can reach, or `paired`, the robot's recorded motion, which includes the mapping's error.",
+            callback=checks.one_of(REFERENCES, "reference"),
+        ),
+    ] = "mapped"
+    preview: Annotated[
+        int, typer.Option(help="Future base commands in the observation; live this is latency.", min=0, max=60)
+    ] = 0
+    history: Annotated[
+        int, typer.Option(help="Past base commands and joint angles in the observation.", min=0, max=60)
+    ] = 0
+    held_out: HeldOutOption = None
+
+    def options(self, *, training: bool = False) -> dict[str, Any]:
+        """Environment options; held-out actions are kept out of fits and, if ``training``, out of the motions."""
+        mapping, preset = mapping_of(self.method, self.preset, self.mapping)
+        operator, robot = ends_of(self.operator, self.robot, self.route)
+        options: dict[str, Any] = {
+            "motions": self.motions,
+            "operator": operator,
+            "robot": robot,
+            "route": route_of(self.route),
+            "mapping": _stored(mapping),
+            "preset": preset,
+            "disturbances": None if self.disturbances == "none" else self.disturbances,
+            "reference": self.reference,
+            "preview": self.preview,
+            "history": self.history,
+        }
+        if self.held_out:
+            known = _actions(self.motions, self.held_out)
+            options["held_out"] = tuple(self.held_out)
+            options["actions"] = tuple(sorted(known - set(self.held_out)) if training else self.held_out)
+        return options
+
+
+def _stored(mapping: str) -> Any:
+    """A stored mapping if one file is named; a method or a folder as it is."""
+    if not Path(mapping).is_file():
+        return mapping
+    from syda_gym.mappings.storage import load_mapping
+
+    return load_mapping(mapping)
+
+
+def _actions(motions: str, names: Sequence[str]) -> set[str]:
+    """All actions of the motions, if the named ones are among them."""
+    from syda_gym.errors import nearest_name
+    from syda_gym.motions.loading import load_motions
+
+    known = {take.action for take in load_motions(motions).takes}
+    for name in names:
+        if name not in known:
+            raise typer.BadParameter(
+                f"{motions} has no action {name!r}; {nearest_name(name, known)}", param_hint="'--held-out'"
+            )
+    return known
+
+
+def with_scene(command: Callable[..., None]) -> Callable[..., None]:
+    """Gives a command that takes ``scene`` the options of a ``Scene`` in its place."""
+    hints = get_type_hints(Scene, include_extras=True)
+    scene = [
+        Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default, annotation=hints[field.name])
+        for field in fields(Scene)
+    ]
+    own = signature(command, eval_str=True)
+
+    @wraps(command)
+    def run(**given: Any) -> None:
+        command(scene=Scene(**{field.name: given.pop(field.name) for field in fields(Scene)}), **given)
+
+    kept = [parameter for name, parameter in own.parameters.items() if name != "scene"]
+    parameters = [*(parameter.replace(kind=Parameter.KEYWORD_ONLY) for parameter in kept), *scene]
+    # Typer reads both.
+    run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return run

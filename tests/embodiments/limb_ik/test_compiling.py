@@ -1,0 +1,37 @@
+"""What numba compiles on first use: an interrupt meanwhile is not lost, and leaves nothing half-made."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import pytest
+
+from syda_gym.embodiments.limb_ik.compiling import first_call
+
+
+class Slow:
+    """A function that gets a signal while it is compiled."""
+
+    signatures: tuple[str, ...] = ()
+    done = False
+
+    def __call__(self, number: int) -> int:
+        os.kill(os.getpid(), signal.SIGINT)
+        self.done = True
+        return number + 1
+
+
+def test_an_interrupt_waits_until_the_function_is_compiled() -> None:
+    function = Slow()
+    with pytest.raises(KeyboardInterrupt):
+        first_call(function, 1)
+    assert function.done
+
+
+def test_a_compiled_function_is_called_as_it_is() -> None:
+    function = Slow()
+    function.signatures = ("(int64,)",)
+    with pytest.raises(KeyboardInterrupt):
+        first_call(function, 1)
+    assert not function.done
