@@ -13,13 +13,8 @@ from syda_gym.embodiments.parametric import parametric_human
 from syda_gym.errors import OptionError
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.synthetic.generator import generate
-<<<<<<<< HEAD:tests/routes/dry_run/test_per_motion.py
-from syda_gym.routes.dry_run.per_motion import routes_for_clips
-from syda_gym.routes.pilot import Pilot
-========
 from syda_gym.routes.piloting.per_motion import routes_for_clips
 from syda_gym.routes.piloting.pilot import Pilot
->>>>>>>> main:tests/routes/piloting/test_per_motion.py
 
 
 @pytest.fixture(scope="module")
