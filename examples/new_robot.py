@@ -33,5 +33,5 @@ moved = np.diff(robot.arm_points(commands), axis=2)
 cosine = np.sum(person * moved, axis=-1) / (np.linalg.norm(person, axis=-1) * np.linalg.norm(moved, axis=-1))
 print(f"{clip.action}: limbs within {np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean():.1f} degrees of the person's")
 
-best = suggest(["adult", "kid", "pepper", "newcomer"], [("adult", "pepper"), ("kid", "pepper")], samples=2**16)[0]
+best = suggest(["adult", "kid", "pepper", "newcomer"], [("adult", "pepper"), ("kid", "pepper")])[0]
 print(f"record next: {' and '.join(best.pair)}")

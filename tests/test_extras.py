@@ -32,9 +32,19 @@ FEATURES = {
         "from pathlib import Path; Path('a.bag').write_bytes(b'#ROSBAG V2.0'); import syda_gym; "
         "syda_gym.load_motions('a.bag')",
     ),
+    "mjcf": (
+        "mujoco",
+        "from pathlib import Path; Path('a.xml').write_text('<mujoco/>'); "
+        "from syda_gym.embodiments.kinematics.urdf import read_urdf; read_urdf('a.xml')",
+    ),
+    "xacro": (
+        "xacrodoc",
+        "from pathlib import Path; Path('a.urdf.xacro').write_text('<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\" name=\"a\">''<xacro:macro name=\"m\"/></robot>'); "
+        "from syda_gym.embodiments.kinematics.urdf import read_urdf; read_urdf('a.urdf.xacro')",
+    ),
     "live": (
         "websockets",
-        "import syda_gym; from syda_gym.teleoperation.incoming.sources import WebSocketSource;"
+        "import syda_gym; from syda_gym.teleoperation.incoming.network import WebSocketSource;"
         "WebSocketSource(syda_gym.embodiment('adult')).start()",
     ),
     "camera": (
@@ -59,8 +69,7 @@ FEATURES = {
     ),
     "ray": (
         "ray",
-        "from syda_gym.evaluation.benchmark.pools import RayPool; import syda_gym;"
-        "RayPool(None, syda_gym.load_motions('embedded', fps=1))",
+        "from syda_gym.evaluation.pools import RayPool; import syda_gym;RayPool(None, print, ())",
     ),
     "data": (
         "pyarrow",

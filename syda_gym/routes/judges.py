@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from syda_gym.embodiments.embodiment import Embodiment
 from syda_gym.errors import EmbodimentError, OptionError, RouteError, nearest_name
 from syda_gym.routes.dry_run.rehearsal import Rehearsal
-from syda_gym.routes.metric import Definition, Transferability, rehearsal, rehearsed
+from syda_gym.routes.metric import OPTIONS, Definition, Transferability, rehearsal, rehearsed
 from syda_gym.routes.metric import transferability as measure
 from syda_gym.routes.route import Route
 
@@ -80,6 +80,9 @@ def make_judge(
             raise OptionError(f"the predictor 'dry_run' has its own definition; drop definition={definition!r}")
         if alpha:
             raise OptionError("the dry run takes noise as sensor= in metres, alpha= belongs to 'general' and 'paper'")
+        for name in options:
+            if name not in (*OPTIONS[REHEARSED], "seed"):
+                raise OptionError(f"the dry run takes no {name!r}; {nearest_name(name, OPTIONS[REHEARSED])}")
         return RehearsalJudge(bodies, options)
     chosen = PREDICTORS[predictor] if isinstance(predictor, str) else predictor
     return ProductJudge(bodies, definition or "general", chosen, alpha or {}, options)

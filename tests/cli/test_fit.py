@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from syda_gym.cli.main import app
 from syda_gym.motions import write_dataset
-from tests.routes.test_pilot import session
+from tests.routes.piloting.test_pilot import session
 
 
 def test_the_command_prints_what_each_action_gained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -20,7 +20,9 @@ def test_the_command_prints_what_each_action_gained(tmp_path: Path, monkeypatch:
     assert result.exit_code == 0, result.output
     assert "0 (unfitted)" in result.output
     assert "error bound on unseen actions" in result.output
-    as_json = CliRunner().invoke(app, ["fit", str(tmp_path / "data"), "--json", "--out", str(tmp_path / "mine")])
+    as_json = CliRunner().invoke(
+        app, ["fit", str(tmp_path / "data"), "--json", "--out", str(tmp_path / "mine.safetensors")]
+    )
     assert [row["actions"] for row in json.loads(as_json.stdout)["rows"]] == [0, 1, 2]
     assert (tmp_path / "mine.safetensors").is_file()
-    assert CliRunner().invoke(app, ["fit", str(tmp_path / "data"), "--from", "adult"]).exit_code != 0
+    assert CliRunner().invoke(app, ["fit", str(tmp_path / "data"), "--operator", "adult"]).exit_code != 0

@@ -78,6 +78,7 @@ def test_one_option_is_one_thing_everywhere():
         "--operator": "motions convert turns the recorded one into it",
         "--method": "reproduce-paper takes several",
         "--workers": "benchmark knows clusters",
+        "--motions": "teleop fits on what was recorded by default",
     }
     seen: dict[str, tuple[str, object]] = {}
     for words, command in ALL.items():

@@ -83,8 +83,8 @@ def test_unknown_source(spec: str, message: str) -> None:
 
 
 def test_unknown_content(tmp_path: Path) -> None:
-    path = tmp_path / "movie.mp4"
-    path.write_bytes(b"\0\0\0 ftyp")
+    path = tmp_path / "sound.wav"
+    path.write_bytes(b"RIFF\0\0\0\0WAVE")
     with pytest.raises(MotionError, match="of no known format"):
         load_motions(path)
 

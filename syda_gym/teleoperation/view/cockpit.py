@@ -26,7 +26,7 @@ from syda_gym.teleoperation.incoming.network import require_token
 from syda_gym.teleoperation.incoming.sources import Source
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
-from syda_gym.teleoperation.outgoing.sinks import ManySinks, Sink
+from syda_gym.teleoperation.outgoing.sinks import Sink
 from syda_gym.teleoperation.tick import Decision
 from syda_gym.teleoperation.view.words import status_text
 from syda_gym.teleoperation.view.writing import Recorder
@@ -93,7 +93,7 @@ class Cockpit:
         self._clock = clock
         self._decision: Decision | None = None
         self._why: dict[str, float] = {}
-        self._angles = _angles_of(sink)
+        self._angles: Callable[[], FloatArray | None] | None = sink.angles
         self._picture_number, self._next_picture = -1, -math.inf
         self._frames: deque[tuple[float, int]] = deque(maxlen=32)
         self.recorder = Recorder(loop, Path(folder))
@@ -170,12 +170,13 @@ class Cockpit:
         return message
 
     def _robot_angles(self, decision: Decision) -> list[float]:
-        angles: FloatArray = decision.command
+        angles: FloatArray | None = None
         if self._angles is not None:
             try:
-                angles = self._angles()
+                angles = self._angles()  # ``None`` of a sink that cannot tell
             except SydaError:  # the simulation has just been closed
                 self._angles = None
+        angles = decision.command if angles is None else angles
         rounded: list[float] = angles.round(4).tolist()
         return rounded
 
@@ -232,15 +233,6 @@ def _plan(loop: TeleoperationLoop, source: Source, appearance: str | os.PathLike
         f"{' > '.join(loop.mapping.route)}", tuple(bodies), BUTTONS, plots, picture=camera, height=max(heights),
         middle=0.5 * OPERATOR_AT,
     )  # fmt: skip
-
-
-def _angles_of(sink: Sink) -> Callable[[], FloatArray] | None:
-    """How to ask for the robot's joint angles, if one of the sinks knows them."""
-    for each in sink.sinks if isinstance(sink, ManySinks) else (sink,):
-        ask: Callable[[], FloatArray] | None = getattr(each, "angles", None)
-        if ask is not None:
-            return ask
-    return None
 
 
 def _number(value: float) -> float | None:
