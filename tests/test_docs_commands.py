@@ -35,6 +35,7 @@ PARSED = {
     "syda-gym transferability --validate": "minutes; tests/evaluation/prediction",
     "syda-gym route --operator adult --robot nao": "fits and plays every link; tests/routes/test_measured.py",
     "syda-gym fit": "needs recordings of a person; tests/routes/piloting",
+    "syda-gym motions info lab.txt": "needs a recording of a format of one's own; tests/motions/readers",
     "syda-gym motions info lab.csv": "needs a recording of a format of one's own; tests/motions/readers",
     "syda-gym record": "needs a person; tests/teleoperation/setup",
     "syda-gym motions pair": "needs recordings of a person; tests/motions/pairing",
