@@ -397,13 +397,8 @@ def _crossing(arm, start, goal, target, staying):
 def follow_arm(arm, target, dt, limited, fresh, state):
     """The next pose of one arm, in place in its state: pose, goal pose, regret [s], on the way, flexion.
 
-    Args:
-        arm: the arm.
-        target: wanted directions.
-        dt: time since the frame before [s].
-        limited: whether joint speeds hold.
-        fresh: whether there is no frame before.
-        state: ``(2 n + 3,)``.
+    ``target`` holds the wanted directions ``(6,)``, ``dt`` the time since the frame before [s]; ``limited`` says if
+    joint speeds hold, ``fresh`` whether there is no frame before; ``state`` is ``(2 n + 3,)``.
     """
     n = len(arm.lower)
     before, goal, q, other = np.empty(n), np.empty(n), np.empty(n), np.empty(n)

@@ -49,7 +49,7 @@ def changed(folder: Path, *replacements: tuple[str, str]) -> Path:
     ],
 )  # fmt: skip
 def test_faults_are_told_with_what_to_write(tmp_path: Path, old: str, new: str, told: str) -> None:
-    with pytest.raises(EmbodimentError, match="not a URDF that can be read|expected a tree") as caught:
+    with pytest.raises(EmbodimentError, match=r"not a URDF that can be read|expected a tree") as caught:
         read_urdf(changed(tmp_path, (old, new)))
     assert told in str(caught.value)
 
