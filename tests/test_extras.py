@@ -40,7 +40,8 @@ FEATURES = {
     "xacro": (
         "xacrodoc",
         "from pathlib import Path; space = 'http://www.ros.org/wiki/xacro'; "
-        'Path(\'a.urdf.xacro\').write_text(f\'<robot xmlns:xacro="{space}" name="a"><xacro:macro name="m"/></robot>\'); '
+        'text = f\'<robot xmlns:xacro="{space}" name="a"><xacro:macro name="m"/></robot>\'; '
+        "Path('a.urdf.xacro').write_text(text); "
         "from syda_gym.embodiments.kinematics.urdf import read_urdf; read_urdf('a.urdf.xacro')",
     ),
     "live": (

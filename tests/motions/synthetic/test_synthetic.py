@@ -80,8 +80,7 @@ def test_actions_differ_from_one_another() -> None:
 def test_the_asset_is_what_the_code_generates(embedded: Motions) -> None:
     """A sample of actions, all bodies. People are the same; robots where they can follow them.
 
-    The file was made before the limb solver chose the least angle out of reach, and stays, for what is shipped stands on
-    it.
+    The file was made before the limb solver chose the least angle out of reach. It stays: what is shipped stands on it.
     """
     fresh = generate(actions=FEW)
     stored = {take.recording: take for take in embedded.takes}
