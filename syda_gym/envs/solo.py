@@ -1,6 +1,8 @@
 """Solo: a fleet of one whose step runs on short arrays and plain numbers, without the fleet's axis of robots.
 
-Every sum is taken in the same order as in ``Fleet``, so that both give the same bits.
+Every sum is taken in the same order as in ``Fleet``, so that both give the same bits; ``tests/envs/test_vector.py``
+holds them together. It is there for speed alone: in one process a fleet of one took 1.36 times its processor time a
+step in the servo model and 1.14 times in Bullet.
 """
 
 from __future__ import annotations
