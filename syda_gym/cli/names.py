@@ -100,7 +100,7 @@ ALGORITHMS = ("ppo", "sac", "tqc")
 PHYSICS = ("bullet", "servo")
 """Simulations."""
 
-REFERENCES = ("paired", "mapped")
+REFERENCES = ("auto", "paired", "mapped")
 """What errors are measured against."""
 
 AXES = ("kinect", "ros", "camera", "unity")

@@ -21,7 +21,7 @@ from syda_gym.teleoperation.calibration import AXES
 
 
 def kinds(written: tuple[str, ...]) -> set[str]:
-    return {text.partition(":")[0] for text in written}
+    return {text.partition(":")[0].partition("[")[0] for text in written}
 
 
 def test_bodies_are_those_of_the_catalog(tmp_path, monkeypatch):
