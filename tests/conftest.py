@@ -21,6 +21,19 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 DRIVER = shutil.which("chromedriver")
 
 
+@pytest.fixture(autouse=True)
+def catalog_forgets() -> Iterator[None]:
+    """Bodies that a test adds to the catalog are gone after it, whichever test comes next in this process."""
+    from syda_gym.embodiments import catalog
+
+    before = dict(catalog._makers)
+    yield
+    if catalog._makers != before:
+        catalog._makers.clear()
+        catalog._makers.update(before)
+        catalog._build.cache_clear()
+
+
 @pytest.fixture(scope="session")
 def shared_dir() -> Path:
     """Folder with recordings and robot facts; they have no licence to be shipped, so it may be absent."""

@@ -47,7 +47,8 @@ class Scene:
         str,
         typer.Option(
             help="What errors are measured against: `mapped`, what the mapping makes of the undisturbed operator, "
-            "which an agent can reach, or `paired`, the robot's recorded motion, which includes the mapping's error.",
+            "which an agent can reach, or `paired`, the robot's recorded motion, which includes the mapping's error; "
+            "`auto` is `paired` where there is such a motion.",
             callback=checks.one_of(REFERENCES, "reference"),
         ),
     ] = "mapped"
