@@ -78,23 +78,13 @@ def test_actions_differ_from_one_another() -> None:
 
 
 def test_the_asset_is_what_the_code_generates(embedded: Motions) -> None:
-    """A sample of actions, all bodies. People are the same; robots where they can follow them.
-
-    The file was made before the limb solver chose the least angle out of reach. It stays: what is shipped stands on it.
-    """
+    """A sample of actions, all bodies."""
     fresh = generate(actions=FEW)
     stored = {take.recording: take for take in embedded.takes}
     for take in fresh.takes:
         for name, frames in take.frames.items():
-            body, before = embedded.bodies[name], stored[take.recording].frames[name]
-            if body.kind == "human":
-                np.testing.assert_allclose(frames, before, rtol=0, atol=0.55e-3)  # half a step is the rounding
-            else:
-                limbs = [np.diff(body.arm_points(rows), axis=2) for rows in (frames, before)]
-                one, other = (rows / np.linalg.norm(rows, axis=-1, keepdims=True) for rows in limbs)
-                angle = np.degrees(np.arccos(np.clip((one * other).sum(axis=-1), -1.0, 1.0)))
-                assert angle.mean() < 8.0
-                assert np.median(angle) < 6.0
+            step = 1e-3 if embedded.bodies[name].kind == "human" else 1e-4  # what the file rounds to
+            np.testing.assert_allclose(frames, stored[take.recording].frames[name], rtol=0, atol=0.55 * step)
             assert np.array_equal(
                 take.filled.get(name, np.zeros(1, bool)), stored[take.recording].filled.get(name, np.zeros(1, bool))
             )
