@@ -4,11 +4,14 @@
     python scripts/study_live_safety.py stops --count 1000 --out docs/results/live_safety.json
     python scripts/study_live_safety.py wire --count 20000 --out docs/results/live_safety.json
     python scripts/study_live_safety.py people --data ../shared/data --out docs/results/live_safety.json
+    python scripts/study_live_safety.py unfamiliar --data ../shared/data --out docs/results/live_safety.json
 
-``pairs``: random pairs of free poses; the motion of the live loop goes from one to the other within 5 s at 30 Hz.
+``pairs``: random pairs of free poses; the motion of the live loop goes from one to the other within 5 s at 30 Hz
+(``--robots pepper`` and ``--robots nao`` may run one after the other; the file keeps both).
 ``stops``: stops in random states of the loop. ``wire``: UDP to UDP in real time beside processes that keep the cores
 busy, flood the source with junk and stop the loop's process now and then; speeds and accelerations are taken from the
 kernel's time stamps of the packets. ``people``: how many frames of real recordings are called implausible.
+``unfamiliar``: how many frames of an action are called unfamiliar by a mapping fitted on the same person's others.
 """
 
 from __future__ import annotations
@@ -34,6 +37,7 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.files import atomic_path
+from syda_gym.mappings.fitting.fit import fit
 from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.motions.loading import load_motions
 from syda_gym.teleoperation import LoopSettings, TeleoperationLoop, Tick, UdpSink, UdpSource, run
@@ -52,17 +56,20 @@ _STAMP = 35  # SO_TIMESTAMPNS
 def main() -> None:
     """Runs one part and writes its figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("part", choices=["pairs", "stops", "wire", "people"])
+    parser.add_argument("part", choices=["pairs", "stops", "wire", "people", "unfamiliar"])
     parser.add_argument("--count", type=int, default=2000)
     parser.add_argument("--robots", nargs="+", default=["pepper", "nao"])
     parser.add_argument("--rate", type=float, default=60.0, help="of the loop on the wire [Hz]")
     parser.add_argument("--data", type=Path, help="folder of recordings for `people`")
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
-    result = {"pairs": pairs, "stops": stops, "wire": wire, "people": people}[args.part](args)
+    parts = {"pairs": pairs, "stops": stops, "wire": wire, "people": people, "unfamiliar": unfamiliar}
+    result = parts[args.part](args)
     print(json.dumps(result, indent=2))
     if args.out is not None:
         known = json.loads(args.out.read_text()) if args.out.is_file() else {}
+        if args.part == "pairs":  # robots may come one after the other
+            result = {**known.get("pairs", {}), **result}
         with atomic_path(args.out) as path:
             path.write_text(json.dumps({**known, args.part: result}, indent=2) + "\n")
 
@@ -289,6 +296,22 @@ def people(args: argparse.Namespace) -> dict[str, Any]:
             if isinstance(body, HumanSkeleton) and len(body.sides) == 2:
                 for clip in motions.clips(name):
                     _watch(body, clip, result)
+    return result
+
+
+def unfamiliar(args: argparse.Namespace) -> dict[str, Any]:
+    """Shares of frames called unfamiliar: of each action by a fit of the others, and of all by a fit of all."""
+    motions, result = load_motions(f"paper:{args.data / 'paper'}"), {}
+    for person in ("adult", "kid"):
+        pair = motions.pair(person, "pepper")
+        held_out = [float(fit(train).unfamiliar(test.source).mean()) for train, test in pair.folds("loao")]
+        result[person] = {
+            "actions": len(held_out),
+            "held_out_mean": float(np.mean(held_out)),
+            "held_out_worst": max(held_out),
+            "of_the_fit_itself": float(fit(pair).unfamiliar(pair.source).mean()),
+            "unfitted": float(unfitted(pair.source_body, pair.target_body).unfamiliar(pair.source).mean()),
+        }
     return result
 
 
