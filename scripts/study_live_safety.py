@@ -7,7 +7,7 @@
     python scripts/study_live_safety.py unfamiliar --data ../shared/data --out docs/results/live_safety.json
 
 ``pairs``: random pairs of free poses; the motion of the live loop goes from one to the other within 5 s at 30 Hz
-(``--robots pepper`` and ``--robots nao`` may run one after the other; the file keeps both).
+(``--progress FOLDER`` keeps each pair's outcome, so that a run goes on where the last one ended).
 ``stops``: stops in random states of the loop. ``wire``: UDP to UDP in real time beside processes that keep the cores
 busy, flood the source with junk and stop the loop's process now and then; speeds and accelerations are taken from the
 kernel's time stamps of the packets. ``people``: how many frames of real recordings are called implausible.
@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import copy
 import json
 import math
 import multiprocessing
@@ -60,6 +61,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=2000)
     parser.add_argument("--robots", nargs="+", default=["pepper", "nao"])
     parser.add_argument("--rate", type=float, default=60.0, help="of the loop on the wire [Hz]")
+    parser.add_argument("--progress", type=Path, help="folder of outcomes of `pairs`; those in it are not run again")
     parser.add_argument("--data", type=Path, help="folder of recordings for `people`")
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
@@ -68,22 +70,56 @@ def main() -> None:
     print(json.dumps(result, indent=2))
     if args.out is not None:
         known = json.loads(args.out.read_text()) if args.out.is_file() else {}
-        if args.part == "pairs":  # robots may come one after the other
-            result = {**known.get("pairs", {}), **result}
         with atomic_path(args.out) as path:
             path.write_text(json.dumps({**known, args.part: result}, indent=2) + "\n")
 
 
 def pairs(args: argparse.Namespace) -> dict[str, Any]:
     """Targets reached by how they could be reached, violations, and the share that was not reached."""
-    return {name: _pairs(_robot(name), args.count) for name in args.robots}
+    return {name: _pairs(_robot(name), args.count, args.progress) for name in args.robots}
 
 
-def _pairs(robot: Robot, count: int) -> dict[str, Any]:
-    check, plain, limiter = SelfCollision(robot), SelfCollision(robot), CommandLimiter(robot)
-    acceleration, rng = limiter.speed / 0.2, np.random.default_rng(0)
-    kinds = {kind: [0, 0] for kind in ("straight", "over_rest", "neither")}
-    wrong, seconds = np.zeros(4, dtype=int), []
+def _pairs(robot: Robot, count: int, folder: Path | None) -> dict[str, Any]:
+    known: dict[int, dict[str, Any]] = {}
+    file = None if folder is None else folder / f"{robot.name}.jsonl"
+    if file is not None and file.is_file():
+        known = {row["pair"]: row for row in map(json.loads, file.read_text().splitlines())}
+    tools = CommandLimiter(robot), SelfCollision(robot)
+    for number in range(count):
+        if number not in known:
+            known[number] = _pair(robot, *tools, number)
+            if file is not None:
+                file.parent.mkdir(parents=True, exist_ok=True)
+                with file.open("a") as stream:
+                    stream.write(json.dumps(known[number]) + "\n")
+    rows = [known[number] for number in range(count)]
+    seconds = [row["seconds"] for row in rows if row["seconds"] is not None]
+    kinds = {kind: [row for row in rows if row["kind"] == kind] for kind in ("straight", "over_rest", "neither")}
+    wrong = np.sum([row["wrong"] for row in rows], axis=0)
+    return {
+        "pairs": count,
+        **{
+            f"{kind}_reached": f"{sum(row['seconds'] is not None for row in some)} of {len(some)}"
+            for kind, some in kinds.items()
+        },
+        "not_reached_percent": 100.0 * (count - len(seconds)) / count,
+        "seconds_p50": float(np.median(seconds)),
+        "seconds_max": float(max(seconds)),
+        **dict(
+            zip(
+                ("contacts", "limit_violations", "speed_violations", "acceleration_violations"),
+                wrong.tolist(),
+                strict=True,
+            )
+        ),
+    }
+
+
+def _pair(robot: Robot, limiter: CommandLimiter, plain: SelfCollision, number: int) -> dict[str, Any]:
+    """One pair: how its goal could be reached, when it was, and how often a limit was broken or links touched."""
+    acceleration, rng = limiter.speed / 0.2, np.random.default_rng([0, number])
+    check = copy.copy(plain)  # what one pair measures is not the next one's
+    check._clearance = copy.copy(plain._clearance)
 
     def free() -> FloatArray:
         while True:
@@ -96,50 +132,31 @@ def _pairs(robot: Robot, count: int) -> dict[str, Any]:
         poses = [start + (end - start) * (index / steps) for index in range(steps + 1)]
         return all(limiter.allows(pose) and not plain.touches(pose) for pose in poses)
 
-    for _ in range(count):
-        start, goal = free(), free()
-        if line(start, goal):
-            kind = "straight"
-        else:
-            kind = "over_rest" if line(start, robot.rest) and line(robot.rest, goal) else "neither"
-        motion = Motion(limiter, check, DT, acceleration, None, start)
-        motion.begin(0.0, None)
-        motion.brake()
-        before, velocity, took = motion.command, np.zeros(robot.n_features), None
-        for index in range(1, 151):
-            motion.begin(index * DT, None)
-            motion.follow(goal, 1.0)
-            check.measure(motion.command)
-            now = (motion.command - before) / DT
-            wrong += [
-                plain.touches(motion.command),
-                int(robot.violations(motion.command, 0.0).sum()),
-                int((np.abs(now) > robot.speed * (1 + 1e-12)).sum()),
-                int((np.abs(now - velocity) > acceleration * DT * (1 + 1e-6)).sum()),
-            ]
-            before, velocity = motion.command, now
-            if np.abs(motion.command - goal).max() < 1e-3:
-                took = index * DT
-                break
-        kinds[kind][1] += 1
-        if took is not None:
-            kinds[kind][0] += 1
-            seconds.append(took)
-    total = sum(of for _, of in kinds.values())
-    return {
-        "pairs": total,
-        **{f"{kind}_reached": f"{reached} of {of}" for kind, (reached, of) in kinds.items()},
-        "not_reached_percent": 100.0 * (total - len(seconds)) / total,
-        "seconds_p50": float(np.median(seconds)),
-        "seconds_max": float(max(seconds)),
-        **dict(
-            zip(
-                ("contacts", "limit_violations", "speed_violations", "acceleration_violations"),
-                wrong.tolist(),
-                strict=True,
-            )
-        ),
-    }
+    start, goal = free(), free()
+    if line(start, goal):
+        kind = "straight"
+    else:
+        kind = "over_rest" if line(start, robot.rest) and line(robot.rest, goal) else "neither"
+    motion = Motion(limiter, check, DT, acceleration, None, start)
+    motion.begin(0.0, None)
+    motion.brake()
+    before, velocity, took, wrong = motion.command, np.zeros(robot.n_features), None, np.zeros(4, dtype=int)
+    for index in range(1, 151):
+        motion.begin(index * DT, None)
+        motion.follow(goal, 1.0)
+        check.measure(motion.command)
+        now = (motion.command - before) / DT
+        wrong += [
+            plain.touches(motion.command),
+            int(robot.violations(motion.command, 0.0).sum()),
+            int((np.abs(now) > robot.speed * (1 + 1e-12)).sum()),
+            int((np.abs(now - velocity) > acceleration * DT * (1 + 1e-6)).sum()),
+        ]
+        before, velocity = motion.command, now
+        if np.abs(motion.command - goal).max() < 1e-3:
+            took = index * DT
+            break
+    return {"pair": number, "kind": kind, "seconds": took, "wrong": wrong.tolist()}
 
 
 def stops(args: argparse.Namespace) -> dict[str, Any]:

@@ -42,7 +42,7 @@ def first_call(function: Callable[..., Any], *arguments: Any) -> Any:
         return function(*arguments)
     with _undisturbed():
         result = function(*arguments)
-    _called.add(function)
+        _called.add(function)
     return result
 
 

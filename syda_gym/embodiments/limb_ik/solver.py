@@ -164,10 +164,9 @@ class LimbIK:
             raise EmbodimentError(
                 f"directions for {self.robot.name!r}: expected ({lead}, {len(self.arms)}, 2, 3), got {wanted.shape}"
             )
-        length = np.sqrt((wanted * wanted).sum(axis=-1, keepdims=True))
-        if not math.isfinite(length.sum()) or (length < _SHORTEST).any():
+        unit = np.empty(wanted.shape)
+        if not _call("unit", np.ascontiguousarray(wanted).reshape(-1, 3), _SHORTEST, unit.reshape(-1, 3)):
             raise EmbodimentError(f"directions for {self.robot.name!r} must be finite and longer than zero")
-        unit: FloatArray = wanted / length
         return unit
 
 
@@ -179,7 +178,12 @@ def _kernel() -> Any:
     return kernel
 
 
-def _call(name: str, *arguments: Any) -> None:
+@lru_cache(maxsize=1)
+def _first_call() -> Any:
     from syda_gym.embodiments.limb_ik.compiling import first_call
 
-    first_call(getattr(_kernel(), name), *arguments)
+    return first_call
+
+
+def _call(name: str, *arguments: Any) -> Any:
+    return _first_call()(getattr(_kernel(), name), *arguments)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,7 @@ class Clearance:
 
     def note(self, pose: FloatArray, distances: FloatArray) -> None:
         """Distances [m] of all pairs were measured at ``pose`` ``(n,)`` [rad]."""
-        self._pose = pose
+        self._pose = np.ascontiguousarray(pose)
         self._room = distances - (self._margin + _SLACK)
         self._stale = False
 
@@ -51,10 +52,8 @@ class Clearance:
         """
         if self._pose is None:
             return None
-        turned = np.abs(poses[0] - self._pose)
-        for pose in poses[1:]:
-            np.maximum(turned, np.abs(pose - self._pose), out=turned)
-        found: list[int] = (self._weights @ turned >= self._room).nonzero()[0].tolist()
+        call, looking = _arithmetic()
+        found: list[int] = call(looking.suspects, self._weights, self._room, self._pose, np.array(poses)).tolist()
         self._stale = self._stale or bool(found)
         return found
 
@@ -68,6 +67,15 @@ class Clearance:
         nearest = self._room + (self._margin + _SLACK) - self._weights @ np.abs(pose - self._pose)
         found: list[int] = (nearest < distance).nonzero()[0].tolist()
         return found
+
+
+@lru_cache(maxsize=1)
+def _arithmetic() -> tuple[Any, Any]:
+    """The compiled part; numba is imported where shapes are looked at, not before."""
+    from syda_gym.embodiments.limb_ik.compiling import first_call
+    from syda_gym.teleoperation.safety.contact import looking
+
+    return first_call, looking
 
 
 def _weights(columns: dict[int, int], model: Any, shapes: Any) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 from syda_gym.embodiments.limb_ik.compiling import compiled
 from syda_gym.teleoperation.safety.contact.solids import points_of_axes, share_of_axis, to_solid
 
-__all__ = ["measure", "near", "touching"]
+__all__ = ["measure", "near", "suspects", "touching"]
 
 _ROUND, _BOX = 0, 1  # as in ``shapes``, where solids are above 0 and others below
 _NOTHING = 1e-12  # m^2; a line between two cores whose square is shorter has no direction
@@ -141,6 +141,26 @@ def _apart(shapes, placed, f, s, limit):
     if not known:
         return _OPEN, distance, cx, cy, cz, x, y, z
     return _MET if x * x + y * y + z * z < _NOTHING else _KNOWN, distance, cx, cy, cz, x, y, z
+
+
+@compiled
+def suspects(weights, room, start, poses):
+    """Pairs that a turn from ``start`` to anywhere in the box of the poses (k, n) may bring nearer than ``room``.
+
+    ``weights`` (pairs, n) say by how much each joint's turn brings a pair nearer at most.
+    """
+    turned, found, count = np.zeros(len(start)), np.empty(len(room), np.int64), 0
+    for row in range(len(poses)):
+        for j in range(len(start)):
+            turned[j] = max(turned[j], abs(poses[row, j] - start[j]))
+    for pair in range(len(room)):
+        nearer = 0.0
+        for j in range(len(start)):
+            nearer += weights[pair, j] * turned[j]
+        if nearer >= room[pair]:
+            found[count] = pair
+            count += 1
+    return found[:count].copy()
 
 
 @compiled
