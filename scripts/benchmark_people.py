@@ -65,6 +65,7 @@ class Bones:
         joints = [self.model.joints[self.model.getJointId(name)] for name in arm.joints]
         self.places = [(joint.idx_q, joint.nq, joint.idx_v) for joint in joints]
         self.links = [self.model.getFrameId(link) for link in (arm.shoulder, arm.elbow, arm.wrist)]
+        self.offsets = [np.array(offset) for offset in arm.point_offsets[:3]]
         pinocchio.framesForwardKinematics(self.model, self.data, pinocchio.neutral(self.model))
         torso = self.data.oMf[self.model.getFrameId(robot.description.torso)].rotation
         axes = np.eye(3) if robot.description.axes is None else np.array(robot.description.axes)
@@ -85,13 +86,14 @@ class Bones:
             full[at : at + size] = angle if size == 1 else (np.cos(angle), np.sin(angle))
         pinocchio.computeJointJacobians(self.model, self.data, full)
         pinocchio.updateFramePlacements(self.model, self.data)
-        points = [self.turn @ self.data.oMf[link].translation for link in self.links]
         world = pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
         columns = [place[2] for place in self.places]
-        slopes = [
-            self.turn @ pinocchio.getFrameJacobian(self.model, self.data, link, world)[:3, columns]
-            for link in self.links
-        ]
+        points, slopes = [], []
+        for link, offset in zip(self.links, self.offsets, strict=True):
+            place, jacobian = self.data.oMf[link], pinocchio.getFrameJacobian(self.model, self.data, link, world)
+            lever = place.rotation @ offset
+            points.append(self.turn @ (place.translation + lever))
+            slopes.append(self.turn @ (jacobian[:3] - pinocchio.skew(lever) @ jacobian[3:])[:, columns])
         found, derivatives = [], []
         for limb in range(2):
             along = points[limb + 1] - points[limb]

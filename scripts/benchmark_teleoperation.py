@@ -2,6 +2,7 @@
 
     python scripts/benchmark_teleoperation.py latency --frames 10000 --rate 30
     python scripts/benchmark_teleoperation.py throughput
+    python scripts/benchmark_teleoperation.py timing            both, with 3000 frames: below three minutes
     python scripts/benchmark_teleoperation.py violations --data FOLDER
     python scripts/benchmark_teleoperation.py network --hours 1
     python scripts/benchmark_teleoperation.py fuzz --inputs 1000000
@@ -50,8 +51,8 @@ from syda_gym.teleoperation.live_statistics import LiveStatistics
 def main() -> None:
     """Runs the part that was asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("part", choices=["latency", "throughput", "violations", "network", "fuzz"])
-    parser.add_argument("--frames", type=int, default=10_000)
+    parser.add_argument("part", choices=["latency", "throughput", "timing", "violations", "network", "fuzz"])
+    parser.add_argument("--frames", type=int, help="of latency (10000) and timing (3000)")
     parser.add_argument("--rate", type=float, default=30.0)
     parser.add_argument("--hours", type=float, default=1.0)
     parser.add_argument("--inputs", type=int, default=1_000_000)
@@ -60,6 +61,7 @@ def main() -> None:
     parser.add_argument("--route", default="auto", help="auto, or bodies such as adult,kid,pepper")
     parser.add_argument("--out", type=Path, help="results file, in which this part is replaced")
     args = parser.parse_args()
+    args.frames = args.frames or (3_000 if args.part == "timing" else 10_000)
     parts = {
         "latency": latency,
         "throughput": throughput,
@@ -67,11 +69,12 @@ def main() -> None:
         "network": network,
         "fuzz": fuzz,
     }
-    result = parts[args.part](args)
+    asked = ["throughput", "latency"] if args.part == "timing" else [args.part]
+    result = {part: parts[part](args) for part in asked}
     print(json.dumps(result, indent=1))
     if args.out is not None:
         before = read_json(args.out) if args.out.exists() else {}
-        write_json(args.out, {**before, args.part: result})
+        write_json(args.out, {**before, **result})
 
 
 def chosen(args: argparse.Namespace) -> Mapping:
@@ -179,24 +182,63 @@ def throughput(args: argparse.Namespace) -> dict[str, Any]:
     }
     result: dict[str, Any] = {"load_average": os.getloadavg()[0]}
     for name, mapping in mappings.items():
-        spent = []
+        spent, held = [], []
         loop = TeleoperationLoop(mapping)
+        clocks = _clocks(loop)
         for index, frame in enumerate(standing):
             loop.step(Tick(index / 30.0, frame, index / 30.0))
+            loop.settle()
+        for clock in clocks.values():
+            clock.clear()
         for index, frame in enumerate(frames, start=len(standing)):
             tick = Tick(index / 30.0, frame, index / 30.0)
             before = time.thread_time()  # of this thread alone, so that other processes do not count
-            loop.step(tick)
+            decision = loop.step(tick)
             spent.append(time.thread_time() - before)
+            loop.settle()  # as the driver does once the command is out
+            held.append(any(reason.startswith("self-collision") for reason in decision.reasons))
         result[name] = {
             "frames_per_second": len(spent) / sum(spent),
             "p50_ms": 1e3 * float(np.percentile(spent, 50)),
             "p99_ms": 1e3 * float(np.percentile(spent, 99)),
+            "p50_free_ms": 1e3 * float(np.median(np.array(spent)[~np.array(held)])),
+            "p50_held_back_ms": 1e3 * float(np.median(np.array(spent)[held])) if any(held) else None,
+            "held_back": sum(held),
+            "parts_ms": {part: 1e3 * sum(clock) / len(spent) for part, clock in clocks.items()},
         }
     rival = result["mink"]["frames_per_second"]
     for name in list(mappings)[:-1]:
         result[name]["times_mink"] = result[name]["frames_per_second"] / rival
     return result
+
+
+def _clocks(loop: TeleoperationLoop) -> dict[str, list[float]]:
+    """Has the loop's parts note their processor time [s]."""
+    found: dict[str, list[float]] = {}
+    for part, owner, name in (
+        ("doubt", loop, "_doubt"),
+        ("mapping", loop, "_guarded"),
+        ("motion", loop._motion, "follow"),
+    ):
+        found[part] = []
+        setattr(owner, name, _Timed(getattr(owner, name), found[part]))
+    return found
+
+
+class _Timed:
+    """Stands in for what it wraps."""
+
+    def __init__(self, wrapped: Any, noted: list[float]) -> None:
+        self._wrapped, self._noted = wrapped, noted
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        before = time.thread_time()
+        result = self._wrapped(*arguments, **named)
+        self._noted.append(time.thread_time() - before)
+        return result
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._wrapped, name)
 
 
 def violations(args: argparse.Namespace) -> dict[str, Any]:

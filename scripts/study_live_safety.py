@@ -4,17 +4,21 @@
     python scripts/study_live_safety.py stops --count 1000 --out docs/results/live_safety.json
     python scripts/study_live_safety.py wire --count 20000 --out docs/results/live_safety.json
     python scripts/study_live_safety.py people --data ../shared/data --out docs/results/live_safety.json
+    python scripts/study_live_safety.py unfamiliar --data ../shared/data --out docs/results/live_safety.json
 
-``pairs``: random pairs of free poses; the motion of the live loop goes from one to the other within 5 s at 30 Hz.
+``pairs``: random pairs of free poses; the motion of the live loop goes from one to the other within 5 s at 30 Hz
+(``--progress FOLDER`` keeps each pair's outcome, so that a run goes on where the last one ended).
 ``stops``: stops in random states of the loop. ``wire``: UDP to UDP in real time beside processes that keep the cores
 busy, flood the source with junk and stop the loop's process now and then; speeds and accelerations are taken from the
 kernel's time stamps of the packets. ``people``: how many frames of real recordings are called implausible.
+``unfamiliar``: how many frames of an action are called unfamiliar by a mapping fitted on the same person's others.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import copy
 import json
 import math
 import multiprocessing
@@ -34,6 +38,7 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.files import atomic_path
+from syda_gym.mappings.fitting.fit import fit
 from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.motions.loading import load_motions
 from syda_gym.teleoperation import LoopSettings, TeleoperationLoop, Tick, UdpSink, UdpSource, run
@@ -52,14 +57,16 @@ _STAMP = 35  # SO_TIMESTAMPNS
 def main() -> None:
     """Runs one part and writes its figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("part", choices=["pairs", "stops", "wire", "people"])
+    parser.add_argument("part", choices=["pairs", "stops", "wire", "people", "unfamiliar"])
     parser.add_argument("--count", type=int, default=2000)
     parser.add_argument("--robots", nargs="+", default=["pepper", "nao"])
     parser.add_argument("--rate", type=float, default=60.0, help="of the loop on the wire [Hz]")
+    parser.add_argument("--progress", type=Path, help="folder of outcomes of `pairs`; those in it are not run again")
     parser.add_argument("--data", type=Path, help="folder of recordings for `people`")
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
-    result = {"pairs": pairs, "stops": stops, "wire": wire, "people": people}[args.part](args)
+    parts = {"pairs": pairs, "stops": stops, "wire": wire, "people": people, "unfamiliar": unfamiliar}
+    result = parts[args.part](args)
     print(json.dumps(result, indent=2))
     if args.out is not None:
         known = json.loads(args.out.read_text()) if args.out.is_file() else {}
@@ -69,14 +76,50 @@ def main() -> None:
 
 def pairs(args: argparse.Namespace) -> dict[str, Any]:
     """Targets reached by how they could be reached, violations, and the share that was not reached."""
-    return {name: _pairs(_robot(name), args.count) for name in args.robots}
+    return {name: _pairs(_robot(name), args.count, args.progress) for name in args.robots}
 
 
-def _pairs(robot: Robot, count: int) -> dict[str, Any]:
-    check, plain, limiter = SelfCollision(robot), SelfCollision(robot), CommandLimiter(robot)
-    acceleration, rng = limiter.speed / 0.2, np.random.default_rng(0)
-    kinds = {kind: [0, 0] for kind in ("straight", "over_rest", "neither")}
-    wrong, seconds = np.zeros(4, dtype=int), []
+def _pairs(robot: Robot, count: int, folder: Path | None) -> dict[str, Any]:
+    known: dict[int, dict[str, Any]] = {}
+    file = None if folder is None else folder / f"{robot.name}.jsonl"
+    if file is not None and file.is_file():
+        known = {row["pair"]: row for row in map(json.loads, file.read_text().splitlines())}
+    tools = CommandLimiter(robot), SelfCollision(robot)
+    for number in range(count):
+        if number not in known:
+            known[number] = _pair(robot, *tools, number)
+            if file is not None:
+                file.parent.mkdir(parents=True, exist_ok=True)
+                with file.open("a") as stream:
+                    stream.write(json.dumps(known[number]) + "\n")
+    rows = [known[number] for number in range(count)]
+    seconds = [row["seconds"] for row in rows if row["seconds"] is not None]
+    kinds = {kind: [row for row in rows if row["kind"] == kind] for kind in ("straight", "over_rest", "neither")}
+    wrong = np.sum([row["wrong"] for row in rows], axis=0)
+    return {
+        "pairs": count,
+        **{
+            f"{kind}_reached": f"{sum(row['seconds'] is not None for row in some)} of {len(some)}"
+            for kind, some in kinds.items()
+        },
+        "not_reached_percent": 100.0 * (count - len(seconds)) / count,
+        "seconds_p50": float(np.median(seconds)),
+        "seconds_max": float(max(seconds)),
+        **dict(
+            zip(
+                ("contacts", "limit_violations", "speed_violations", "acceleration_violations"),
+                wrong.tolist(),
+                strict=True,
+            )
+        ),
+    }
+
+
+def _pair(robot: Robot, limiter: CommandLimiter, plain: SelfCollision, number: int) -> dict[str, Any]:
+    """One pair: how its goal could be reached, when it was, and how often a limit was broken or links touched."""
+    acceleration, rng = limiter.speed / 0.2, np.random.default_rng([0, number])
+    check = copy.copy(plain)  # what one pair measures is not the next one's
+    check._clearance = copy.copy(plain._clearance)
 
     def free() -> FloatArray:
         while True:
@@ -89,50 +132,31 @@ def _pairs(robot: Robot, count: int) -> dict[str, Any]:
         poses = [start + (end - start) * (index / steps) for index in range(steps + 1)]
         return all(limiter.allows(pose) and not plain.touches(pose) for pose in poses)
 
-    for _ in range(count):
-        start, goal = free(), free()
-        if line(start, goal):
-            kind = "straight"
-        else:
-            kind = "over_rest" if line(start, robot.rest) and line(robot.rest, goal) else "neither"
-        motion = Motion(limiter, check, DT, acceleration, None, start)
-        motion.begin(0.0, None)
-        motion.brake()
-        before, velocity, took = motion.command, np.zeros(robot.n_features), None
-        for index in range(1, 151):
-            motion.begin(index * DT, None)
-            motion.follow(goal, 1.0)
-            check.measure(motion.command)
-            now = (motion.command - before) / DT
-            wrong += [
-                plain.touches(motion.command),
-                int(robot.violations(motion.command, 0.0).sum()),
-                int((np.abs(now) > robot.speed * (1 + 1e-12)).sum()),
-                int((np.abs(now - velocity) > acceleration * DT * (1 + 1e-6)).sum()),
-            ]
-            before, velocity = motion.command, now
-            if np.abs(motion.command - goal).max() < 1e-3:
-                took = index * DT
-                break
-        kinds[kind][1] += 1
-        if took is not None:
-            kinds[kind][0] += 1
-            seconds.append(took)
-    total = sum(of for _, of in kinds.values())
-    return {
-        "pairs": total,
-        **{f"{kind}_reached": f"{reached} of {of}" for kind, (reached, of) in kinds.items()},
-        "not_reached_percent": 100.0 * (total - len(seconds)) / total,
-        "seconds_p50": float(np.median(seconds)),
-        "seconds_max": float(max(seconds)),
-        **dict(
-            zip(
-                ("contacts", "limit_violations", "speed_violations", "acceleration_violations"),
-                wrong.tolist(),
-                strict=True,
-            )
-        ),
-    }
+    start, goal = free(), free()
+    if line(start, goal):
+        kind = "straight"
+    else:
+        kind = "over_rest" if line(start, robot.rest) and line(robot.rest, goal) else "neither"
+    motion = Motion(limiter, check, DT, acceleration, None, start)
+    motion.begin(0.0, None)
+    motion.brake()
+    before, velocity, took, wrong = motion.command, np.zeros(robot.n_features), None, np.zeros(4, dtype=int)
+    for index in range(1, 151):
+        motion.begin(index * DT, None)
+        motion.follow(goal, 1.0)
+        check.measure(motion.command)
+        now = (motion.command - before) / DT
+        wrong += [
+            plain.touches(motion.command),
+            int(robot.violations(motion.command, 0.0).sum()),
+            int((np.abs(now) > robot.speed * (1 + 1e-12)).sum()),
+            int((np.abs(now - velocity) > acceleration * DT * (1 + 1e-6)).sum()),
+        ]
+        before, velocity = motion.command, now
+        if np.abs(motion.command - goal).max() < 1e-3:
+            took = index * DT
+            break
+    return {"pair": number, "kind": kind, "seconds": took, "wrong": wrong.tolist()}
 
 
 def stops(args: argparse.Namespace) -> dict[str, Any]:
@@ -289,6 +313,22 @@ def people(args: argparse.Namespace) -> dict[str, Any]:
             if isinstance(body, HumanSkeleton) and len(body.sides) == 2:
                 for clip in motions.clips(name):
                     _watch(body, clip, result)
+    return result
+
+
+def unfamiliar(args: argparse.Namespace) -> dict[str, Any]:
+    """Shares of frames called unfamiliar: of each action by a fit of the others, and of all by a fit of all."""
+    motions, result = load_motions(f"paper:{args.data / 'paper'}"), {}
+    for person in ("adult", "kid"):
+        pair = motions.pair(person, "pepper")
+        held_out = [float(fit(train).unfamiliar(test.source).mean()) for train, test in pair.folds("loao")]
+        result[person] = {
+            "actions": len(held_out),
+            "held_out_mean": float(np.mean(held_out)),
+            "held_out_worst": max(held_out),
+            "of_the_fit_itself": float(fit(pair).unfamiliar(pair.source).mean()),
+            "unfitted": float(unfitted(pair.source_body, pair.target_body).unfamiliar(pair.source).mean()),
+        }
     return result
 
 

@@ -16,6 +16,10 @@ __all__ = ["compiled", "copy", "first_call"]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
+_called: set[Callable[..., Any]] = set()
+# Numba's own list of what is compiled is made anew whenever one asks, which takes longer than most calls.
+
+
 def compiled(function: Function) -> Function:
     """Compiles on first use and keeps the code: beside its file, or in the user's cache where that is read-only.
 
@@ -34,10 +38,12 @@ def first_call(function: Callable[..., Any], *arguments: Any) -> Any:
 
     LLVM calls back into Python while it compiles, where an exception is lost and leaves half a function.
     """
-    if function.signatures:  # type: ignore[attr-defined]
+    if function in _called:
         return function(*arguments)
     with _undisturbed():
-        return function(*arguments)
+        result = function(*arguments)
+        _called.add(function)
+    return result
 
 
 @contextmanager

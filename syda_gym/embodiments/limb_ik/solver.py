@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -130,10 +131,9 @@ class LimbIK:
                 f"the state is of {len(state)} sequences with {state.numbers.shape[1]} numbers each; "
                 f"{self.robot.name!r} needs {self.state_size} for each of {count} sequences"
             )
-        steps = np.array(
-            np.broadcast_to(np.asarray(_kernel().FRAME if dt is None else dt, dtype=np.float64), (count, length))
-        )
-        if not (np.isfinite(steps).all() and (steps > 0.0).all()):
+        steps = np.empty((count, length))
+        steps[...] = _kernel().FRAME if dt is None else dt
+        if steps.size and not (float(steps.min()) > 0.0 and float(steps.max()) < math.inf):
             raise EmbodimentError("the time between frames must be positive and finite")
         numbers, frames = state.numbers.copy(), np.empty((count, length, self.robot.n_features))
         first = 0
@@ -164,13 +164,13 @@ class LimbIK:
             raise EmbodimentError(
                 f"directions for {self.robot.name!r}: expected ({lead}, {len(self.arms)}, 2, 3), got {wanted.shape}"
             )
-        length = np.sqrt((wanted * wanted).sum(axis=-1, keepdims=True))
-        if not math.isfinite(length.sum()) or (length < _SHORTEST).any():
+        unit = np.empty(wanted.shape)
+        if not _call("unit", np.ascontiguousarray(wanted).reshape(-1, 3), _SHORTEST, unit.reshape(-1, 3)):
             raise EmbodimentError(f"directions for {self.robot.name!r} must be finite and longer than zero")
-        unit: FloatArray = wanted / length
         return unit
 
 
+@lru_cache(maxsize=1)
 def _kernel() -> Any:
     """The compiled part; numba is imported where arms are solved, not before."""
     from syda_gym.embodiments.limb_ik import kernel
@@ -178,7 +178,12 @@ def _kernel() -> Any:
     return kernel
 
 
-def _call(name: str, *arguments: Any) -> None:
+@lru_cache(maxsize=1)
+def _first_call() -> Any:
     from syda_gym.embodiments.limb_ik.compiling import first_call
 
-    first_call(getattr(_kernel(), name), *arguments)
+    return first_call
+
+
+def _call(name: str, *arguments: Any) -> Any:
+    return _first_call()(getattr(_kernel(), name), *arguments)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.embodiments.robot import Robot
 
 __all__ = ["Clearance"]
 
@@ -22,15 +22,15 @@ class Clearance:
     greatest possible distance from the joint. Pairs that were further apart than that, and the margin, are still free.
 
     Args:
-        robot: whose arm joints.
-        model: pinocchio's model of it.
+        columns: from pinocchio's joints to the angles of a pose.
+        model: pinocchio's model of the robot.
         shapes: its collision shapes and their pairs.
         margin: distance [m] below which a pair counts as touching.
     """
 
-    def __init__(self, robot: Robot, model: Any, shapes: Any, margin: float) -> None:
+    def __init__(self, columns: dict[int, int], model: Any, shapes: Any, margin: float) -> None:
         self._margin = margin
-        self._weights = _weights(robot, model, shapes)
+        self._weights = _weights(columns, model, shapes)
         self._pose: FloatArray | None = None
         self._room = np.zeros(len(self._weights))
         self._stale = True
@@ -39,10 +39,10 @@ class Clearance:
         """Whether a measurement at ``pose`` ``(n,)`` [rad] would clear suspicions."""
         return self._stale and (self._pose is None or bool((self._pose != pose).any()))
 
-    def note(self, pose: FloatArray, distances: list[float]) -> None:
+    def note(self, pose: FloatArray, distances: FloatArray) -> None:
         """Distances [m] of all pairs were measured at ``pose`` ``(n,)`` [rad]."""
-        self._pose = pose
-        self._room = np.array(distances) - (self._margin + _SLACK)
+        self._pose = np.ascontiguousarray(pose)
+        self._room = distances - (self._margin + _SLACK)
         self._stale = False
 
     def suspects(self, *poses: FloatArray) -> list[int] | None:
@@ -52,10 +52,8 @@ class Clearance:
         """
         if self._pose is None:
             return None
-        turned = np.abs(poses[0] - self._pose)
-        for pose in poses[1:]:
-            np.maximum(turned, np.abs(pose - self._pose), out=turned)
-        found: list[int] = (self._weights @ turned >= self._room).nonzero()[0].tolist()
+        call, looking = _arithmetic()
+        found: list[int] = call(looking.suspects, self._weights, self._room, self._pose, np.array(poses)).tolist()
         self._stale = self._stale or bool(found)
         return found
 
@@ -71,9 +69,17 @@ class Clearance:
         return found
 
 
-def _weights(robot: Robot, model: Any, shapes: Any) -> FloatArray:
+@lru_cache(maxsize=1)
+def _arithmetic() -> tuple[Any, Any]:
+    """The compiled part; numba is imported where shapes are looked at, not before."""
+    from syda_gym.embodiments.limb_ik.compiling import first_call
+    from syda_gym.teleoperation.safety.contact import looking
+
+    return first_call, looking
+
+
+def _weights(columns: dict[int, int], model: Any, shapes: Any) -> FloatArray:
     """How far a pair can come nearer for each joint's turn ``(pairs, n)`` [m/rad]."""
-    columns = {model.getJointId(name): column for column, name in enumerate(robot.joint_names)}
     reaches = []
     for shape in shapes.geometryObjects:
         shape.geometry.computeLocalAABB()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.kinematics.coupled import coupled_range
 from syda_gym.embodiments.robot import CoupledLimit, Robot
 from syda_gym.errors import OptionError
+
+if TYPE_CHECKING:
+    from syda_gym.teleoperation.safety.stepping import Bounds
 
 __all__ = ["UNKNOWN_SPEED", "CommandLimiter"]
 
@@ -50,6 +54,19 @@ class CommandLimiter:
             if row.joint in names and row.by in names
         )
         self._range = self.lower.tolist(), self.upper.tolist()
+
+    def bounds(self, acceleration: FloatArray, jerk: FloatArray | None) -> Bounds:
+        """All that bounds a step, as the compiled arithmetic takes it.
+
+        Args:
+            acceleration: greatest ``(n,)`` [rad/s^2].
+            jerk: greatest ``(n,)`` [rad/s^3]; ``None`` if any will do.
+        """
+        from syda_gym.teleoperation.safety.stepping import Bounds
+
+        most = np.full(len(self.lower), np.inf) if jerk is None else jerk
+        rows = [self.lower, self.upper, self.speed, acceleration, most]
+        return Bounds.of(rows, [(row.joint, row.by, row.row) for row in self._coupled])
 
     def start(self, angles: FloatArray) -> FloatArray:
         """The allowed command nearest to ``angles`` ``(n,)`` [rad]; where a run begins."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import copy
 import math
 from collections import deque
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from syda_gym.teleoperation.safety.slide import slide
 
 __all__ = ["Motion", "Moved"]
 
-_LOOK = 0.1  # rad; how far apart the looked-at poses of a way to a standstill are
 _STANDING = 1e-9  # rad/s
 _DAMPING = 8.0  # 1/s; share of a pair's distance by which it may shrink in a second
 _NEAR = 0.08  # m; pairs further apart do not take part in sliding
@@ -70,7 +70,7 @@ class Motion:
         self._limiter = limiter
         self._collision = collision if collision is not None and collision.available else None
         self._most = acceleration * (1.0 - 1e-9)
-        self._jerk = jerk
+        self._bounds = limiter.bounds(self._most, jerk)
         self._pace = Pace(period, len(start))
         self._now = 0.0
         self._target: FloatArray | None = None  # of the step before
@@ -90,6 +90,8 @@ class Motion:
         self._trail: deque[FloatArray] = deque(maxlen=_CORNERS)
         self._overlaps: dict[int, float] = {}
         self.place(self.command)
+        self._intend(self.command, 1.0, period)  # compiled now rather than on the way
+        self._ahead(self._drift)
 
     @property
     def standing(self) -> bool:
@@ -144,8 +146,7 @@ class Motion:
         return twin
 
     def _straight(self, target: FloatArray, factor: float) -> Moved:
-        low, high = self._window(factor)
-        wanted = np.clip(self._wanted(target), low, high)
+        low, high, wanted = self._intend(target, factor, self._pace.dt)
         if not wanted.any():
             self._step = np.zeros(len(target))
             return Moved()
@@ -167,30 +168,17 @@ class Motion:
         self._go(braked)
         return Moved(True)
 
-    def _wanted(self, target: FloatArray) -> FloatArray:
-        """The velocity that arrives at the target as soon as possible and does not overshoot it."""
-        pace, way = self._pace, target - self.command
-        lag = pace.dt if self._jerk is None else pace.dt + 0.5 * self._most / self._jerk
-        reach = braking_speed(np.abs(way - self._drift * pace.dt), self._most, lag)
-        wanted = np.clip(way / pace.dt, self._drift - reach, self._drift + reach)
-        below = braking_speed(np.maximum(self.command - self._limiter.lower, 0.0), self._most, pace.dt)
-        above = braking_speed(np.maximum(self._limiter.upper - self.command, 0.0), self._most, pace.dt)
-        return np.clip(wanted, -below, above)
-
-    def _window(self, factor: float) -> tuple[FloatArray, FloatArray]:
-        """Velocities that speed, acceleration and jerk permit ``(n,)`` [rad/s]."""
+    def _intend(self, target: FloatArray, factor: float, dt: float) -> FloatArray:
+        """Least, greatest and wanted velocity ``(3, n)`` [rad/s], see ``intention``."""
         pace = self._pace
-        change = self._most * pace.change
-        low, high = pace.velocity - change, pace.velocity + change
-        slowest, fastest = low, high  # to come down from a speed that has become too high counts more
-        if self._jerk is not None:
-            swing = self._jerk * pace.change
-            low = np.maximum(low, np.minimum(pace.velocity + (pace.acceleration - swing) * pace.change, high))
-            high = np.minimum(high, np.maximum(pace.velocity + (pace.acceleration + swing) * pace.change, low))
-        cap = min(max(factor, 0.0), 1.0) * self._limiter.speed * (1.0 - 1e-9)
-        high = np.maximum(np.minimum(high, cap), slowest)
-        low = np.minimum(np.maximum(low, -cap), fastest)
-        return np.minimum(low, high), np.maximum(low, high)
+        state = np.array((self.command, pace.velocity, pace.acceleration, self._drift))
+        found: FloatArray = _call("intention", self._bounds, state, target, dt, pace.change, factor)
+        return found
+
+    def _ahead(self, velocity: FloatArray) -> tuple[FloatArray, bool]:
+        """Poses ``(1 + k, n)`` after a step and on the way to a standstill, and whether limits allow them."""
+        found: tuple[FloatArray, bool] = _call("ahead", self._bounds, self.command, velocity, self._pace.dt)
+        return found
 
     def _braked(self) -> FloatArray:
         """The velocity of the first step to a standstill."""
@@ -203,42 +191,28 @@ class Motion:
 
     def _try(self, velocity: FloatArray) -> bool:
         """Takes a step if it and the way to a standstill after it are within limits and free."""
-        end = self._end(velocity)
-        poses = self._standstill(end, velocity)
-        if not (self._limiter.allows(end) and all(map(self._limiter.allows, poses))):
+        poses, allowed = self._ahead(velocity)
+        if not allowed or (self._collision is not None and not self._free(poses)):
             return False
-        if self._collision is not None and not self._free(end, poses):
-            return False
-        self._go(velocity)
+        self._step = poses[0] - self.command
+        self._arrive(poses[0].copy())
         self._in_line = False
         return True
 
-    def _standstill(self, start: FloatArray, velocity: FloatArray) -> list[FloatArray]:
-        """Poses on the way from ``start`` to a standstill, each joint braking for itself."""
-        speed = np.abs(velocity)
-        takes = speed / self._most
-        count = math.ceil(float((0.5 * speed * takes).max()) / _LOOK)
-        longest, poses = float(takes.max()), []
-        for index in range(1, count + 1):
-            time = np.minimum(takes, longest * index / count)
-            pose = start + np.sign(velocity) * time * (speed - 0.5 * self._most * time)
-            poses.append(np.minimum(np.maximum(pose, self._limiter.lower), self._limiter.upper))
-        return poses
-
-    def _free(self, end: FloatArray, after: list[FloatArray]) -> bool:
+    def _free(self, poses: FloatArray) -> bool:
         check = self._collision
         assert check is not None  # the caller looked; for the type checker
-        suspects = check.suspects(self.command, end, *after[-1:])
+        suspects = check.suspects(self.command, poses[0], poses[-1])
         if suspects == []:
             return True
         if self._overlaps:
-            return self._comes_apart(end)
-        if check.free([end, *after], suspects, reserve=True):
+            return self._comes_apart(poses[0])
+        if check.free(poses, suspects, reserve=True):
             return True
         # Where the robot stands nearer than the reserve already, the margin alone counts.
-        if check.free([self.command], suspects, reserve=True):
+        if check.free(self.command[None], suspects, reserve=True):
             return False
-        return check.free([end, *after], suspects)
+        return check.free(poses, suspects)
 
     def _comes_apart(self, end: FloatArray) -> bool:
         """For a robot that was put where it touches: whether nothing comes nearer and nothing else touches."""
@@ -273,6 +247,9 @@ class Motion:
         if not self._limiter.allows(end):  # rounding at the edge of a coupled limit
             end = self.command
         self._step = end - self.command
+        self._arrive(end)
+
+    def _arrive(self, end: FloatArray) -> None:
         self.command = end
         if self._overlaps and self._step.any():
             assert self._collision is not None
@@ -281,24 +258,19 @@ class Motion:
     def _watch(self, target: FloatArray) -> None:
         """Notices how the target moves, and when the robot gets no nearer to it."""
         if self._target is not None and self._pace.dt > 0.0:
-            drift = (target - self._target) / self._pace.dt
-            # What moved once may have jumped; a velocity is what two steps have in common.
-            before = self._last_drift
-            self._drift = np.where(
-                drift * before > 0.0, np.sign(drift) * np.minimum(np.abs(drift), np.abs(before)), 0.0
+            self._drift, self._last_drift = _call(
+                "drifted", self._bounds, target, self._target, self._last_drift, self._pace.dt
             )
-            self._drift = np.clip(self._drift, -self._limiter.speed, self._limiter.speed)
-            self._last_drift = drift
         else:
             self._drift = self._last_drift = np.zeros(len(target))
         self._target = target
-        if self._goal is None or float(np.abs(target - self._goal).max()) > _SAME_GOAL:
+        if self._goal is None or _apart(target, self._goal) > _SAME_GOAL:
             self._goal, self._best, self._search, self._next_search = target, math.inf, None, self._now
             self._searching = False
             self._trail.append(self.command)
-        if self._way and float(np.abs(target - self._way_goal).max()) > _SAME_GOAL:
+        if self._way and _apart(target, self._way_goal) > _SAME_GOAL:
             self._way = []
-        distance = float(np.abs(target - self.command).max())
+        distance = _apart(target, self.command)
         if distance < self._best - _PROGRESS or distance < _ARRIVED:
             self._best, self._best_at, self._was_held = min(distance, self._best), self._now, False
         elif self._was_held and self._now - self._best_at > _PATIENCE and self._now >= self._next_search:
@@ -337,7 +309,7 @@ class Motion:
         way = corner - self.command
         length = float(np.abs(way).max())
         unit = way / length
-        low, high = self._window(factor)
+        low, high, _ = self._intend(corner, factor, self._pace.dt)
         moving = np.abs(unit) > 1e-12
         ends = np.stack([low[moving] / unit[moving], high[moving] / unit[moving]])
         slow, fast = float(ends.min(axis=0).max()), float(ends.max(axis=0).min())
@@ -347,7 +319,7 @@ class Motion:
         velocity = unit * speed
         end = corner if speed * self._pace.dt >= length * (1.0 - 1e-12) else self._end(velocity)
         off = self._pace.velocity - unit * float(self._pace.velocity @ unit / (unit @ unit))
-        free = self._collision is None or self._collision.free([end], self._collision.suspects(self.command, end))
+        free = self._collision is None or self._collision.free(end[None], self._collision.suspects(self.command, end))
         if slow > fast or float(np.abs(off).max()) > 1e-6 or not free or not self._limiter.allows(end):
             self._go(self._braked())
             if self.standing:
@@ -361,7 +333,7 @@ class Motion:
     def _remember(self) -> None:
         if self._collision is None or self._way:
             return
-        if not self._trail or float(np.abs(self.command - self._trail[-1]).max()) > _CORNER:
+        if not self._trail or _apart(self.command, self._trail[-1]) > _CORNER:
             self._trail.append(self.command)
 
     def _forget(self) -> None:
@@ -369,3 +341,22 @@ class Motion:
         self._target = self._goal = self._search = None
         self._way, self._best, self._was_held, self._searching = [], math.inf, False, False
         self._next_search = self._now
+
+
+def _apart(pose: FloatArray, other: FloatArray) -> float:
+    """The greatest distance of their joints [rad]."""
+    return float(_call("apart", pose, other))
+
+
+@lru_cache(maxsize=1)
+def _arithmetic() -> tuple[Any, Any]:
+    """The compiled part; numba is imported where something moves, not before."""
+    from syda_gym.embodiments.limb_ik.compiling import first_call
+    from syda_gym.teleoperation.safety import stepping
+
+    return first_call, stepping
+
+
+def _call(name: str, *arguments: Any) -> Any:
+    call, stepping = _arithmetic()
+    return call(getattr(stepping, name), *arguments)

@@ -64,21 +64,23 @@ class _Pose(NamedTuple):
     size: float
 
 
-class _Room:
+class _Room(NamedTuple):
     """How far something may go: a burst that refills at a rate, as in a token bucket."""
 
-    def __init__(self, limits: tuple[float, float]) -> None:
-        self.burst, self.rate = limits
-        self.left = self.burst
+    burst: float
+    rate: float
+    left: float
 
     def allows(self, moved: float, quiet: float) -> bool:
         return moved <= self.left + self.rate * quiet
 
     def take(self, moved: float, quiet: float) -> _Room:
         """What is left after a movement."""
-        room = copy.copy(self)
-        room.left = min(self.burst, self.left + self.rate * quiet - moved)
-        return room
+        return _Room(self.burst, self.rate, min(self.burst, self.left + self.rate * quiet - moved))
+
+
+def _room(limits: tuple[float, float]) -> _Room:
+    return _Room(*limits, limits[0])
 
 
 class Plausibility:
@@ -102,8 +104,8 @@ class Plausibility:
         self._previous: _Pose | None = None
         self._quiet = 0.0  # s since the last believed frame
         self._ratio = 1.0
-        self._place, self._heading = _Room(_PLACE), _Room(_HEADING)
-        self._elbow, self._wrist = _Room(_ELBOW), _Room(_WRIST)
+        self._place, self._heading = _room(_PLACE), _room(_HEADING)
+        self._elbow, self._wrist = _room(_ELBOW), _room(_WRIST)
         self._lost = ""
         self._back = 0.0  # s for which a lost person has been back
         self._bits = b""

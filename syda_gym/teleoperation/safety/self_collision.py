@@ -1,20 +1,22 @@
-"""SelfCollision: would the robot touch itself? The URDF's collision shapes, checked by pinocchio and coal."""
+"""SelfCollision: would the robot touch itself? The URDF's collision shapes, by closed forms or pinocchio and coal."""
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.kinematics.urdf import UrdfTree, configuration, read_urdf
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
 from syda_gym.teleoperation.safety.clearance import Clearance
+from syda_gym.teleoperation.safety.contact.shapes import of_model
 
 __all__ = ["RESERVE", "SelfCollision"]
 
@@ -25,6 +27,7 @@ _SAMPLES = 256
 _STEP = 0.1  # rad; how far apart the tested poses of a way may be
 _FEW = 24  # pairs; looking at more of them one by one takes as long as looking at all
 _LARGE = 500  # vertices of a mesh
+_CLOSE = 0.25  # m; a bound above it will do for a distance
 _ALWAYS = 0.5  # pairs that touch in more than this share of random poses overlap by construction
 
 
@@ -34,6 +37,9 @@ class SelfCollision:
     The joints that are not arm joints are locked at rest. Pairs of shapes that are neighbours in the kinematic tree,
     that the description disables, that already touch at rest or that touch in most random poses say nothing about a
     pose and are left out, as in the set-up assistants of motion planners.
+
+    Spheres, capsules, and these against boxes and cylinders have closed forms, which are computed in compiled loops
+    over all pairs at once. The other pairs (two boxes, meshes) are excluded by balls about them, or else asked of coal.
 
     Args:
         robot: whose shapes.
@@ -67,11 +73,17 @@ class SelfCollision:
         except (ValueError, RuntimeError) as error:  # meshes that are missing or broken
             self.why = f"self-collision is not checked: {str(error).splitlines()[0]}"
         else:
-            self._index, self._turns, self._columns = _indices(self._model, robot)
+            self._index, self._turns, self._columns, joints = _indices(self._model, robot)
             self._configuration = np.zeros(self._model.nq)
             self._choose_pairs(samples)
-            self._clearance = Clearance(robot, self._model, self._shapes, margin + RESERVE)
+            self._clearance = Clearance(joints, self._model, self._shapes, margin + RESERVE)
+            self._arrays = of_model(self._model, self._shapes, joints)
+            self._every = np.arange(len(self._shapes.collisionPairs))
             self.pairs = len(self._shapes.collisionPairs)
+            if self._arrays is not None:  # compiled now rather than on the way
+                self.near(robot.rest, 0.0)
+                self._touch(robot.rest[None], [])
+                self._distances(robot.rest)
             if not self.pairs:
                 self.why = f"self-collision is not checked: {robot.urdf.name} has no collision shapes on two links"
 
@@ -84,13 +96,12 @@ class SelfCollision:
         """Whether any pair of links is nearer than the margin at ``angles`` ``(n,)`` [rad]."""
         if not self.available:
             return False
-        return self._touches(angles, self._clearance.suspects(angles))
+        return self._touch(angles[None], self._clearance.suspects(angles))
 
     def measure(self, angles: FloatArray) -> None:
         """Measures all distances at ``angles`` ``(n,)`` [rad], where that helps: checks near there become cheap."""
         if self.available and self._clearance.wants(angles):
-            self._pin.computeDistances(self._model, self._data, self._shapes, self._shape_data, self._full(angles))
-            self._clearance.note(angles, [result.min_distance for result in self._shape_data.distanceResults])
+            self._clearance.note(angles, self._distances(angles))
 
     def ignores_far_links(self) -> bool:
         """Whether a pair was left out because it touches at rest although the links are no near relatives.
@@ -125,17 +136,15 @@ class SelfCollision:
         """Pairs that may touch somewhere in the box of joint angles that ``poses`` span; ``None`` if all may."""
         return self._clearance.suspects(*poses) if self.available else []
 
-    def free(self, poses: Sequence[FloatArray], suspects: list[int] | None, reserve: bool = False) -> bool:
-        """Whether none of the suspected pairs touches at any pose ``(n,)`` [rad]; the last one is tried first.
+    def free(self, poses: ArrayLike, suspects: list[int] | None, reserve: bool = False) -> bool:
+        """Whether none of the suspected pairs touches at any pose ``(poses, n)`` [rad]; the last one is tried first.
 
         Args:
             poses: to look at.
             suspects: indices of pairs; all if ``None``.
             reserve: asks for ``RESERVE`` more than the margin.
         """
-        if suspects == []:
-            return True
-        return not any(self._touches(pose, suspects, reserve) for pose in reversed(poses))
+        return suspects == [] or not self._touch(np.asarray(poses), suspects, reserve)
 
     def overlaps(self, angles: FloatArray) -> dict[int, float]:
         """Pairs nearer than the margin at ``angles`` ``(n,)`` [rad], and how near [m]."""
@@ -160,13 +169,28 @@ class SelfCollision:
         Returns:
             Distances ``(pairs,)`` [m], negative where shapes overlap, and gradients ``(pairs, n)`` [m/rad].
         """
+        pairs = self._clearance.within(angles, within)
+        if self._arrays is None:
+            return self._near(angles, pairs, within)
+        distances, gradients = np.zeros(len(pairs)), np.zeros((len(pairs), len(angles)))
+        asked, states = np.array(pairs, dtype=np.int64), np.zeros(len(pairs), dtype=np.int64)
+        _call("near", self._arrays, np.ascontiguousarray(angles), asked, within, distances, gradients, states)
+        for index in np.flatnonzero(states == 2):
+            distance, gradient = self._near(angles, [pairs[index]], within)
+            states[index] = len(distance)
+            if len(distance):
+                distances[index], gradients[index] = distance[0], gradient[0]
+        found = states == 1
+        return distances[found], gradients[found]
+
+    def _near(self, angles: FloatArray, pairs: list[int], within: float) -> tuple[FloatArray, FloatArray]:
+        """As ``near``, of the given pairs, by pinocchio and coal."""
         pin, model, data = self._pin, self._model, self._data
-        configuration = self._full(angles)
-        pin.computeJointJacobians(model, data, configuration)
+        pin.computeJointJacobians(model, data, self._full(angles))
         pin.updateGeometryPlacements(model, data, self._shapes, self._shape_data)
         look, shapes, shape_data = pin.computeDistance, self._shapes, self._shape_data
-        distances, normals, pairs, first, second = [], [], [], [], []
-        for pair in self._clearance.within(angles, within):
+        distances, normals, kept, first, second = [], [], [], [], []
+        for pair in pairs:
             result = look(shapes, shape_data, pair)
             distance = result.min_distance
             if distance < within:
@@ -174,13 +198,13 @@ class SelfCollision:
                 normals.append(result.normal)  # from the first shape to the second
                 first.append(result.getNearestPoint1())
                 second.append(result.getNearestPoint2())
-                pairs.append(pair)
-        gradients = np.zeros((len(pairs), len(angles)))
-        if not pairs:
+                kept.append(pair)
+        gradients = np.zeros((len(kept), len(angles)))
+        if not kept:
             return np.zeros(0), gradients
         away = np.array(normals)
         for points, side, sign in ((np.array(first), 0, -1.0), (np.array(second), 1, 1.0)):
-            joints = self._carriers[pairs, side]
+            joints = self._carriers[kept, side]
             for joint in set(joints.tolist()) - {0}:
                 rows = joints == joint
                 jacobian = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)[:, self._columns]
@@ -189,23 +213,54 @@ class SelfCollision:
         usable = np.isfinite(gradients).all(axis=1)
         return np.array(distances)[usable], gradients[usable]
 
+    def _distances(self, angles: FloatArray) -> FloatArray:
+        """Distances of all pairs [m], or what they are at least where that is far."""
+        everything = self._model, self._data, self._shapes, self._shape_data
+        if self._arrays is None:
+            self._pin.computeDistances(*everything, self._full(angles))
+            return np.array([result.min_distance for result in self._shape_data.distanceResults])
+        distances, opened = np.empty(self.pairs), np.empty(self.pairs, dtype=np.bool_)
+        _call("measure", self._arrays, np.ascontiguousarray(angles), distances, opened)
+        left = np.flatnonzero(opened & (distances < _CLOSE)).tolist()
+        if left:
+            self._pin.updateGeometryPlacements(*everything, self._full(angles))
+        for pair in left:
+            distances[pair] = self._pin.computeDistance(self._shapes, self._shape_data, pair).min_distance
+        return distances
+
     def _is_free(self, start: FloatArray, end: FloatArray, suspects: list[int] | None) -> bool:
         """As ``free_path``, looking at the suspected pairs only, at all if there is no telling."""
         if suspects == []:
             return True
-        farthest = float(np.abs(end - start).max())
-        if farthest <= _STEP:
-            return not self._touches(end, suspects)
-        count = math.ceil(farthest / _STEP)
-        return not any(self._touches(start + (end - start) * (i / count), suspects) for i in range(count, 0, -1))
+        count = max(math.ceil(float(np.abs(end - start).max()) / _STEP), 1)
+        return not self._touch(start + (end - start) * (np.arange(1, count + 1)[:, None] / count), suspects)
 
-    def _touches(self, angles: FloatArray, suspects: list[int] | None, reserve: bool = False) -> bool:
+    def _touch(self, poses: FloatArray, suspects: list[int] | None, reserve: bool = False) -> bool:
+        """Whether any of the suspected pairs (all if ``None``) touches at any of the poses ``(K, n)``."""
+        if self._arrays is None:
+            return any(self._touches(pose, suspects, reserve) for pose in poses[::-1])
+        pairs = self._every if suspects is None else np.array(suspects, dtype=np.int64)
+        opened, poses = (
+            np.zeros((len(poses), len(pairs)), dtype=np.bool_),
+            np.ascontiguousarray(poses, dtype=np.float64),
+        )
+        margin = self.margin + RESERVE if reserve else self.margin
+        if _call("touching", self._arrays, poses, pairs, margin, opened):
+            return True
+        if not opened.any():
+            return False
+        return any(
+            self._touches(pose, pairs[left].tolist(), reserve)
+            for pose, left in zip(poses[::-1], opened[::-1], strict=True)
+            if left.any()
+        )
+
+    def _touches(self, angles: FloatArray, suspects: list[int] | None, reserve: bool) -> bool:
+        """The same at one pose, by pinocchio and coal."""
         shape_data = self._reserved if reserve else self._shape_data
         everything = self._model, self._data, self._shapes, shape_data, self._full(angles)
         if suspects is None or len(suspects) > _FEW:
             return bool(self._pin.computeCollisions(*everything, True))
-        if not suspects:
-            return False
         self._pin.updateGeometryPlacements(*everything)
         look = self._pin.computeCollision
         return any(look(self._shapes, shape_data, pair) for pair in suspects)
@@ -397,17 +452,32 @@ def _hull(mesh: Any) -> Any:
     return coal.ConvexBase.convexHull(vertices, True, "Qt")
 
 
-def _indices(model: Any, robot: Robot) -> tuple[list[int], list[tuple[int, int]], list[int]]:
-    """Where each arm joint's angle goes in pinocchio's configuration, continuous joints, and columns of Jacobians."""
-    index, turns, columns = [], [], []
+def _indices(model: Any, robot: Robot) -> tuple[list[int], list[tuple[int, int]], list[int], dict[int, int]]:
+    """Where angles go in pinocchio's configuration, continuous joints, columns of Jacobians, and joints to angles."""
+    index, turns, columns, joints = [], [], [], {}
     names = read_urdf(robot.urdf).model_joints
     for column, name in enumerate(robot.joint_names):
         joint = model.joints[model.getJointId(names[name])]
+        joints[int(joint.id)] = column
         index.append(joint.idx_q)
         columns.append(joint.idx_v)
         if joint.nq == 2:
             turns.append((column, joint.idx_q))
-    return index, turns, columns
+    return index, turns, columns, joints
+
+
+def _call(name: str, *arguments: Any) -> Any:
+    """Calls a compiled function; numba is imported where shapes are looked at, not before."""
+    call, looking = _arithmetic()
+    return call(getattr(looking, name), *arguments)
+
+
+@lru_cache(maxsize=1)
+def _arithmetic() -> tuple[Any, Any]:
+    from syda_gym.embodiments.limb_ik.compiling import first_call
+    from syda_gym.teleoperation.safety.contact import looking
+
+    return first_call, looking
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

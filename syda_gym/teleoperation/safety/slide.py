@@ -30,22 +30,17 @@ def slide(
     """
     from scipy.optimize import nnls
 
+    from syda_gym.embodiments.limb_ik.compiling import first_call
+    from syda_gym.teleoperation.safety.stepping import system
+
     joints = len(wanted)
-    scale = np.maximum(high - low, 1e-9)  # fast joints give way first; and it makes the numbers alike
-    identity = np.eye(joints)
-    rows = np.vstack([gradients * scale, identity, -identity])
-    least = np.concatenate([slowest - gradients @ wanted, (low - wanted) / scale, (wanted - high) / scale])
-    if (least <= 0.0).all():
+    matrix, scale, broken = first_call(system, wanted, low, high, gradients, slowest)
+    if not broken:
         return np.clip(wanted, low, high)
-    # Rows of one length: a distant joint and a near one count alike.
-    length = np.linalg.norm(rows, axis=1)
-    usable = length > 1e-9
-    rows, least = rows[usable] / length[usable, None], least[usable] / length[usable]
-    matrix = np.vstack([rows.T, least[None]])
     goal = np.zeros(joints + 1)
     goal[-1] = 1.0
     try:
-        weights, residual = nnls(matrix, goal, maxiter=20 * len(least))
+        weights, residual = nnls(matrix, goal, maxiter=20 * matrix.shape[1])
     except RuntimeError:  # it did not converge
         return None
     if residual < 1e-6:

@@ -1,0 +1,217 @@
+"""stepping: the arithmetic of one step of ``Motion`` and of ``slide``, in compiled plain loops."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.embodiments.limb_ik.compiling import compiled
+
+__all__ = ["Bounds", "ahead", "apart", "drifted", "intention", "system"]
+
+_LOOK = 0.1  # rad; how far apart the looked-at poses of a way to a standstill are
+_FEW = 1e-9  # a row of the system that is shorter says nothing
+_SLACK = 1e-12  # rad; by which coupled limits may be missed through rounding
+
+
+class Bounds(NamedTuple):
+    """What bounds a robot's steps; few arrays, because each costs half a microsecond a call.
+
+    Attributes:
+        joints: lower and upper limits [rad], greatest speed, acceleration and jerk (infinite if any will do)
+            ``(5, n)``.
+        coupled: the governed and the governing joint of each coupled limit, the first of its rows in the table, and the
+            one past its last ``(c, 4)``.
+        table: governor's angle, lower and upper limit ``(rows, 3)`` [rad].
+    """
+
+    joints: FloatArray
+    coupled: NDArray[np.int64]
+    table: FloatArray
+
+    @classmethod
+    def of(cls, joints: list[Any], coupled: list[tuple[int, int, Any]]) -> Bounds:
+        """From the five rows, and joint, governor and limit of every coupled limit."""
+        rows: list[tuple[int, int, int, int]] = []
+        table: list[tuple[float, float, float]] = []
+        for joint, governor, limit in coupled:
+            first = len(table)
+            table += zip(limit.at, limit.lower, limit.upper, strict=True)
+            rows.append((joint, governor, first, len(table)))
+        return cls(
+            np.array(joints, dtype=np.float64),
+            np.array(rows, dtype=np.int64).reshape(-1, 4),
+            np.array(table, dtype=np.float64).reshape(-1, 3),
+        )
+
+
+@compiled
+def _clipped(value, low, high):
+    """As numpy's: the upper bound wins."""
+    return min(max(value, low), high)
+
+
+@compiled
+def _braking(distance, most, delay):
+    """As ``pace.braking_speed``."""
+    return most * (math.sqrt(delay * delay + 2.0 * distance / most) - delay)
+
+
+@compiled
+def intention(bounds, state, target, dt, change, factor):
+    """Least and greatest velocity that speed, acceleration and jerk permit, and the wanted one within them ``(3, n)``.
+
+    The wanted velocity arrives at the target as soon as possible and does not overshoot it. Rows of ``state``: the last
+    command, its velocity and acceleration, the target's velocity.
+    """
+    n = len(target)
+    result = np.empty((3, n))
+    share = min(max(factor, 0.0), 1.0)
+    for j in range(n):
+        lower, upper, speed = bounds.joints[0, j], bounds.joints[1, j], bounds.joints[2, j]
+        most, jerk = bounds.joints[3, j], bounds.joints[4, j]
+        command, velocity, acceleration, drift = state[0, j], state[1, j], state[2, j], state[3, j]
+        slowest, fastest = velocity - most * change, velocity + most * change
+        low, high = slowest, fastest  # to come down from a speed that has become too high counts more
+        lag = dt
+        if jerk < math.inf:
+            swing = jerk * change
+            low = max(low, min(velocity + (acceleration - swing) * change, high))
+            high = min(high, max(velocity + (acceleration + swing) * change, low))
+            lag = dt + 0.5 * most / jerk
+        cap = share * speed * (1.0 - 1e-9)
+        high = max(min(high, cap), slowest)
+        low = min(max(low, -cap), fastest)
+        low, high = min(low, high), max(low, high)
+        way = target[j] - command
+        reach = _braking(abs(way - drift * dt), most, lag)
+        wanted = _clipped(way / dt, drift - reach, drift + reach)
+        below = _braking(max(command - lower, 0.0), most, dt)
+        above = _braking(max(upper - command, 0.0), most, dt)
+        result[0, j], result[1, j] = low, high
+        result[2, j] = _clipped(_clipped(wanted, -below, above), low, high)
+    return result
+
+
+@compiled
+def _allowed(bounds, poses, row):
+    """Whether a pose lies within all limits, coupled ones included."""
+    for j in range(poses.shape[1]):
+        if not (bounds.joints[0, j] <= poses[row, j] <= bounds.joints[1, j]):
+            return False
+    for which in range(len(bounds.coupled)):
+        joint, by, first = bounds.coupled[which, 0], bounds.coupled[which, 1], bounds.coupled[which, 2]
+        last, governor = bounds.coupled[which, 3] - 1, poses[row, by]
+        if not governor > bounds.table[first, 0]:
+            low, high = bounds.table[first, 1], bounds.table[first, 2]
+        elif governor >= bounds.table[last, 0]:
+            low, high = bounds.table[last, 1], bounds.table[last, 2]
+        else:
+            i = first
+            while bounds.table[i + 1, 0] <= governor:
+                i += 1
+            step, width = governor - bounds.table[i, 0], bounds.table[i + 1, 0] - bounds.table[i, 0]
+            low = (bounds.table[i + 1, 1] - bounds.table[i, 1]) / width * step + bounds.table[i, 1]
+            high = (bounds.table[i + 1, 2] - bounds.table[i, 2]) / width * step + bounds.table[i, 2]
+        if not (low - _SLACK <= poses[row, joint] <= high + _SLACK):
+            return False
+    return True
+
+
+@compiled
+def ahead(bounds, command, velocity, dt):
+    """The pose after a step and those on the way to a standstill from there ``(1 + k, n)``; whether all are allowed.
+
+    Each joint brakes for itself.
+    """
+    n = len(command)
+    longest, farthest = 0.0, 0.0
+    for j in range(n):
+        speed = abs(velocity[j])
+        takes = speed / bounds.joints[3, j]
+        longest, farthest = max(longest, takes), max(farthest, 0.5 * speed * takes)
+    count = math.ceil(farthest / _LOOK)
+    poses = np.empty((1 + count, n))
+    for j in range(n):
+        lower, upper, most = bounds.joints[0, j], bounds.joints[1, j], bounds.joints[3, j]
+        end = _clipped(command[j] + velocity[j] * dt, lower, upper)
+        poses[0, j] = end
+        speed = abs(velocity[j])
+        takes = speed / most
+        for row in range(1, 1 + count):
+            time = min(takes, longest * row / count)
+            way = time * (speed - 0.5 * most * time)
+            poses[row, j] = _clipped(end + way if velocity[j] > 0.0 else end - way, lower, upper)
+    for row in range(1 + count):
+        if not _allowed(bounds, poses, row):
+            return poses, False
+    return poses, True
+
+
+@compiled
+def apart(a, b):
+    """The greatest distance of two poses' joints [rad]."""
+    most = 0.0
+    for j in range(len(a)):
+        most = max(most, abs(a[j] - b[j]))
+    return most
+
+
+@compiled
+def drifted(bounds, target, before, last, dt):
+    """The target's velocity, and what it was by the last two targets alone ``(2, n)`` [rad/s].
+
+    What moved once may have jumped; a velocity is what two steps have in common.
+    """
+    result = np.empty((2, len(target)))
+    for j in range(len(target)):
+        drift = (target[j] - before[j]) / dt
+        common = 0.0
+        if drift * last[j] > 0.0:
+            common = min(abs(drift), abs(last[j]))
+            common = common if drift > 0.0 else -common
+        result[0, j] = _clipped(common, -bounds.joints[2, j], bounds.joints[2, j])
+        result[1, j] = drift
+    return result
+
+
+@compiled
+def system(wanted, low, high, gradients, slowest):
+    """The least-distance problem of ``slide`` as non-negative least squares ``(n + 1, rows)``.
+
+    Rows are left out that hold anywhere between ``low`` and ``high``, and those that say nothing. The scale of the
+    joints comes along ``(n,)``, and whether the wanted velocity breaks any row.
+    """
+    n = len(wanted)
+    scale, matrix = np.empty(n), np.empty((n + 1, 2 * n + len(slowest)))
+    count, broken = 0, False
+    for j in range(n):
+        scale[j] = max(high[j] - low[j], 1e-9)  # fast joints give way first; and it makes the numbers alike
+    for row in range(len(slowest)):
+        least, worst, square = slowest[row], 0.0, 0.0
+        for j in range(n):
+            slope = gradients[row, j]
+            least -= slope * wanted[j]
+            worst += min(slope * low[j], slope * high[j])
+            square += slope * scale[j] * slope * scale[j]
+        length = math.sqrt(square)
+        if worst < slowest[row] and (length > _FEW or least > 0.0):
+            broken = broken or least > 0.0
+            if length > _FEW:  # rows of one length: a distant joint and a near one count alike
+                for j in range(n):
+                    matrix[j, count] = gradients[row, j] * scale[j] / length
+                matrix[n, count] = least / length
+                count += 1
+    for sign in (1.0, -1.0):
+        for j in range(n):
+            for i in range(n):
+                matrix[i, count] = sign if i == j else 0.0
+            least = (low[j] - wanted[j] if sign > 0.0 else wanted[j] - high[j]) / scale[j]
+            matrix[n, count] = least
+            broken = broken or least > 0.0
+            count += 1
+    return matrix[:, :count].copy(), scale, broken
