@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import lru_cache
 from itertools import islice
@@ -25,6 +25,8 @@ from syda_gym.motions.readers.landmarks.arrays import is_arrays
 from syda_gym.motions.readers.landmarks.read import is_json
 from syda_gym.motions.readers.own.npz import read_npz
 from syda_gym.motions.readers.own.paper import read_paper
+from syda_gym.motions.readers.own.people import doubts
+from syda_gym.motions.readers.recording import say
 from syda_gym.motions.readers.said import told
 from syda_gym.motions.readers.tables.read import is_table, read_kinect, read_openni, read_table
 from syda_gym.motions.readers.text import first_bytes
@@ -101,14 +103,24 @@ def load_motions(
         return motions if fps is None else resampled(motions, fps)
     chosen, path = _format_and_path(os.fspath(spec))
     if chosen.name == "paper" and fps is not None and not speaks:
-        return read_paper(path, fps)
+        return _doubted(read_paper(path, fps), path)
     if speaks and not chosen.listens:
         raise OptionError(
             f"{path} is of the format {chosen.name!r}, which says joints, units and axes itself; leave them out"
         )
     motions = chosen.read(path, said) if chosen.listens else chosen.read(path)
+    if chosen.name in _OWN:
+        motions = _doubted(motions, path)
     rate = fps if fps is not None else said.fps
     return motions if rate is None else resampled(motions, rate)
+
+
+def _doubted(motions: Motions, path: Path) -> Motions:
+    """The same motions; what is odd about their people is noted and said aloud, as foreign readers do."""
+    odd = doubts(motions)
+    for line in odd:
+        say(f"{path}: {line}")
+    return replace(motions, notes=tuple(dict.fromkeys((*motions.notes, *odd)))) if odd else motions
 
 
 @lru_cache(maxsize=1)
@@ -194,3 +206,5 @@ FORMATS: dict[str, Format] = {
     )
 }  # fmt: skip
 """Known formats by prefix, in the order in which a file is tried."""
+
+_OWN = ("paper", "pairs", "npz")  # whose readers make no person of joints, but take the bodies that the file names
