@@ -1,4 +1,4 @@
-"""Are these people? What is asked of every foreign recording, asked of files that say themselves whose joints they hold.
+"""Are these people? What every foreign recording is asked, asked of files that say themselves whose joints they hold.
 
 Such a file knows its bodies, so three things more can be asked: are limbs as long as the body says, is the left
 shoulder on the left, and do hands hang. Nothing is refused: a data set that somebody made is said to be odd.
