@@ -308,7 +308,9 @@ def _human(
             name, height=stature, upper_arm=float(links[0]), forearm=float(links[1]), shoulders=shoulders, sides=sides
         )
     except EmbodimentError as error:
-        raise MotionError(f"{path}: the joints make no human: {error}") from error
+        raise MotionError(
+            f"{path}: the joints make no human: {error}. --unit says what the file's numbers are"
+        ) from error
 
 
 def _middle(

@@ -113,6 +113,7 @@ def test_people_as_they_are_pass_in_silence(recorded: Motions, tmp_path: Path) -
     assert doubts(load_motions("embedded")) == ()
 
 
+@pytest.mark.filterwarnings("ignore::syda_gym.motions.readers.skeleton.MotionWarning")
 def test_what_is_odd_is_said_once_however_often_it_is_stored(recorded: Motions, tmp_path: Path) -> None:
     first = load_motions(save_motions(changed(recorded, swap), tmp_path / "a.npz"))
     again = load_motions(save_motions(first, tmp_path / "b.npz"))
