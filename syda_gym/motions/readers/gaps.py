@@ -230,7 +230,10 @@ def _say_held(recording: Recording, name: str, values: FloatArray, shoulder: Flo
     longest = _longest(held, times)
     if longest < _HELD:
         return
-    text = f"{name} does not move at all for {longest:.2f} s though its shoulder does: it seems to have been lost and held in place"
+    text = (
+        f"{name} does not move at all for {longest:.2f} s though its shoulder does: it seems to have been lost and "
+        "held in place"
+    )
     recording.doubt(text) if longest > 1.0 else recording.notes.append(text)
 
 

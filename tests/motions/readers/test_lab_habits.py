@@ -26,32 +26,6 @@ NAMES = [*lab.ARMS, "LHip", "RHip", "Head"]
 HEADER = ["time", *(f"{name}_{axis}" for name in NAMES for axis in "xyz")]
 CLOCK = [f"{i / 100:.2f}" for i in range(COUNT)]
 LOST = slice(10, 20)
-SEGMENTS = [
-    "Pelvis",
-    "L5",
-    "L3",
-    "T12",
-    "T8",
-    "Neck",
-    "Head",
-    "RightShoulder",
-    "RightUpperArm",
-    "RightForeArm",
-    "RightHand",
-    "LeftShoulder",
-    "LeftUpperArm",
-    "LeftForeArm",
-    "LeftHand",
-    "RightUpperLeg",
-    "RightLowerLeg",
-    "RightFoot",
-    "RightToe",
-    "LeftUpperLeg",
-    "LeftLowerLeg",
-    "LeftFoot",
-    "LeftToe",
-]
-
 Rows = list[list[str]]
 
 
@@ -109,22 +83,9 @@ def vicon_two_header_rows(path: Path) -> Path:
     return write(path / "two.csv", header, [[f"{value:.3f}" for value in row] for row in table])
 
 
-def mvnx(path: Path, *, rate: str = ' frameRate="60"', position: bool = True, before: str = "") -> Path:
-    points = lab._order(lab.XSENS, lab._person()).reshape(COUNT, -1)
-
-    def frame(kind: str, index: int, values: Sequence[float]) -> str:
-        text = " ".join(f"{value:.6f}" for value in values)
-        place = f"<position>{text}</position>" if position else "<orientation>1 0 0 0</orientation>"
-        return f'<frame time="{round(1000 * index / 60)}" index="{index}" type="{kind}">{place}</frame>'
-
-    frames = "".join(frame(kind, 0, np.zeros(69)) for kind in ("identity", "tpose"))
-    frames += "".join(frame("normal", index, row) for index, row in enumerate(points))
-    labels = "".join(f'<segment label="{name}" id="{i + 1}"/>' for i, name in enumerate(SEGMENTS))
+def mvnx(path: Path, **changes: object) -> Path:
     file = path / "walk.mvnx"
-    file.write_text(
-        f'<?xml version="1.0" encoding="UTF-8"?>{before}\n<mvnx xmlns="http://www.xsens.com/mvn/mvnx" version="4">'
-        f'<subject label="Anna"{rate}><segments>{labels}</segments><frames>{frames}</frames></subject></mvnx>'
-    )
+    file.write_text(rec.mvnx_text(lab._order(lab.XSENS, lab._person()), **changes))  # type: ignore[arg-type]
     return file
 
 
@@ -386,6 +347,7 @@ def test_what_cannot_be_read_says_what_to_do(tmp_path: Path, kind: str) -> None:
         ('<segment label="Pelvis" id="1"/>', "", r"69 numbers for 22 segments"),
         ("LeftForeArm", "LeftArmour", "LElbow is missing"),
         ("<subject", "<object", "is no whole XML"),
+        ("UTF-8", "UTF--8", "is no whole XML: unknown encoding"),
     ],
 )
 def test_damaged_mvnx(tmp_path: Path, before: str, after: str, words: str) -> None:

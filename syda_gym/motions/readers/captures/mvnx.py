@@ -110,7 +110,7 @@ def _subjects(file: Path, content: bytes) -> list[_Subject]:
                 if tag in ("frame", "segment", "sensor", "joint", "point"):
                     element.clear()
         parser.close()
-    except ElementTree.ParseError as error:
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # LookupError: an encoding that does not exist
         raise MotionError(f"{file} is no whole XML: {error}; export it again") from error
     return subjects
 
