@@ -127,7 +127,7 @@ def environment(folder: Path) -> None:
     rows = []
     for robot, route in (("pepper", ("adult", "kid", "pepper")), ("nao", ("adult", "nao"))):
         env = gym.make("SydaTeleop-v0", robot=robot, route=route, render_mode="rgb_array", camera={"ground": GROUND})
-        shown = list(episode(env, "archer-01"))
+        shown = list(episode(env, "archer-01", every=8))
         rows.append(np.hstack([shown[round(share * (len(shown) - 1))][0] for share in (0.2, 0.45, 0.7)]))
         if robot == "pepper":
             infos = [info for _, info in shown[1:]]

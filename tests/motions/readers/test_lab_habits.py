@@ -347,7 +347,7 @@ def test_what_cannot_be_read_says_what_to_do(tmp_path: Path, kind: str) -> None:
         ('<segment label="Pelvis" id="1"/>', "", r"69 numbers for 22 segments"),
         ("LeftForeArm", "LeftArmour", "LElbow is missing"),
         ("<subject", "<object", "is no whole XML"),
-        ("UTF-8", "UTF--8", "is no whole XML: unknown encoding"),
+        ("UTF-8", "UT", "is no whole XML: unknown encoding"),
     ],
 )
 def test_damaged_mvnx(tmp_path: Path, before: str, after: str, words: str) -> None:
