@@ -38,6 +38,7 @@ def draw(
     turn: float = 0.35,
     finer: int = 2,
     ground: str = "day",
+    letters: int | None = None,
 ) -> Image:
     """Draws bodies side by side at one frame.
 
@@ -50,6 +51,7 @@ def draw(
         turn: how far the camera stands to the side [rad].
         finer: pixels are drawn this much finer and averaged; 1 is four times as fast and has jagged edges.
         ground: one of ``look.GROUNDS``: ``day`` for light pages, ``night`` for dark ones, ``dusk`` for both.
+        letters: height of words [pixels]; by default a 32nd of the picture's, at least 12. A label may have lines.
 
     Returns:
         ``(height, width, 3)`` uint8.
@@ -81,7 +83,7 @@ def draw(
         for i in range(len(tracks))
     ]
     places = [(x / finer, y / finer) for x, y in places]
-    return _write_words(image, places, labels or [track.name for track in tracks], title, stage.ink)
+    return _write_words(image, places, labels or [track.name for track in tracks], title, stage.ink, letters)
 
 
 def write_png(image: Image, path: str | os.PathLike[str]) -> Path:
@@ -266,7 +268,12 @@ _INTERSECT = {"sphere": _hit_sphere, "cylinder": _hit_cylinder, "box": _hit_box}
 
 
 def _write_words(
-    image: Image, places: list[tuple[float, float]], labels: Sequence[str], title: str, colour: Sequence[float]
+    image: Image,
+    places: list[tuple[float, float]],
+    labels: Sequence[str],
+    title: str,
+    colour: Sequence[float],
+    letters: int | None,
 ) -> Image:
     from PIL import Image as Pillow
     from PIL import ImageDraw, ImageFont
@@ -274,9 +281,9 @@ def _write_words(
     picture = Pillow.fromarray(image)
     pen = ImageDraw.Draw(picture)
     ink = tuple(round(255 * part) for part in colour)
-    font = ImageFont.load_default(size=max(12, image.shape[0] // 32))
+    font = ImageFont.load_default(size=letters or max(12, image.shape[0] // 32))
     for (x, y), label in zip(places, labels, strict=True):
-        pen.text((x, y + image.shape[0] // 60), label, fill=ink, font=font, anchor="ma")
+        pen.text((x, y + image.shape[0] // 60), label, fill=ink, font=font, anchor="ma", align="center")
     if title:
         pen.text((image.shape[1] // 60, image.shape[0] // 40), title, fill=ink, font=font)
     return np.asarray(picture)

@@ -97,7 +97,12 @@ def write_demo_report(
                     (folder / "side_by_side.png").read_bytes(),
                     variants=_other_pages(shown, middle, names),
                 ),
-                Picture("Film", (folder / "chains.mp4").read_bytes(), "video/mp4"),
+                Picture(
+                    "Film",
+                    (folder / "chains.mp4").read_bytes(),
+                    "video/mp4",
+                    variants={"poster": png_bytes(_still(shown, names, title, middle))},
+                ),
             ],
         ),
         Section("What this shows", [Text(line) for line in shows(result)]),
@@ -223,8 +228,10 @@ def _regions(result: DemoResult) -> Picture:
 def _other_pages(shown: Sequence[Track], frame: int, names: Sequence[str]) -> dict[str, bytes]:
     """The bodies side by side for dark pages, and, with letters that can be read there, for phones."""
     wide = png_bytes(draw(shown, frame, labels=names, ground="night"))
+    short = [name.partition("(")[2].rstrip(")") or name for name in names]  # "pepper (simulated)" has no room
     narrow, narrow_dark = (
-        png_bytes(draw(shown, frame, size=(700, 560), labels=names, ground=ground)) for ground in ("day", "night")
+        png_bytes(draw(shown, frame, size=(700, 560), labels=short, ground=ground, letters=25))
+        for ground in ("day", "night")
     )
     return {"dark": wide, "narrow": narrow, "narrow-dark": narrow_dark}
 
@@ -285,7 +292,12 @@ def _film(tracks: Sequence[Track], names: Sequence[str], title: str, tell: Calla
     count = min(len(tracks[0]), _FILM_FRAMES)
     for frame in range(count):
         tell(frame / count)
-        yield draw(tracks, frame, labels=names, title=title, size=(768, 432), finer=1, ground="dusk")
+        yield _still(tracks, names, title, frame, finer=1)
+
+
+def _still(tracks: Sequence[Track], names: Sequence[str], title: str, frame: int, finer: int = 2) -> Any:
+    """A picture of the film, on a ground that stands on light pages and on dark ones."""
+    return draw(tracks, frame, labels=names, title=title, size=(768, 432), finer=finer, ground="dusk")
 
 
 def _mean(chain: ChainResult, name: str) -> float:
