@@ -98,6 +98,7 @@ def motion_targets(folder: Path) -> list[Target]:
         file_target("kinect", [kinect]),
         file_target("openni", [openni, text("cornell.txt", "\n".join(recordings.cornell_lines(6)))]),
         file_target("bvh", [text("walk.bvh", recordings.bvh_text())]),
+        file_target("mvnx", [text("walk.mvnx", mvnx_of_somebody())]),
         file_target("mediapipe", [text("pose.json", recordings.json_text(pose))], mixed(in_json)),
         file_target("keypoints", [points_file(folder)], mixed(in_archive)),
         file_target("table", [*case_files("*.csv"), *case_files("*.txt"), *case_files("*.skeleton")]),
@@ -107,6 +108,17 @@ def motion_targets(folder: Path) -> list[Target]:
         paper_target(folder),
         *pairs_targets(folder, few),
     ]
+
+
+def mvnx_of_somebody() -> str:
+    """Six frames of Xsens MVN; segments that the synthetic person lacks lie at its neck."""
+    _, joints = recordings.moving_human(count=6)
+    parts = {"UpperArm": "Shoulder", "ForeArm": "Elbow", "Hand": "Hand", "UpperLeg": "Hip", "LowerLeg": "Knee"}
+    names = [
+        next((f"{name[0]}{joint}" for part, joint in parts.items() if name in (f"Left{part}", f"Right{part}")), "Neck")
+        for name in recordings.MVNX_SEGMENTS.split()
+    ]
+    return recordings.mvnx_text(np.stack([joints[name] for name in names], axis=1))
 
 
 def case_files(pattern: str) -> list[Path]:

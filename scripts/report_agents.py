@@ -17,11 +17,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.evaluation.statistics import estimate, iqm, probability_of_improvement
 from syda_gym.files import read_json, write_json, write_text
+from syda_gym.look import plot_theme
+
+matplotlib.use("Agg")
 
 CELLS = (
     ("lag", "test"),
@@ -217,9 +221,6 @@ def _verdict(held: bool) -> str:
 
 def curve_picture(cells: Mapping[tuple[str, str], Cell], path: Path) -> None:
     """Error against jitter with every method on it, one panel a cell."""
-    import matplotlib
-
-    matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(2, 3, figsize=(13, 8.6))
@@ -248,9 +249,6 @@ def curve_picture(cells: Mapping[tuple[str, str], Cell], path: Path) -> None:
 
 def learning_picture(study: Path, path: Path) -> None:
     """Validation objective over training, one line a seed."""
-    import matplotlib
-
-    matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
     groups: dict[str, list[list[float]]] = defaultdict(list)
@@ -330,8 +328,9 @@ def main() -> None:
             ]
         ),
     )
-    curve_picture(cells, given.out / "images" / "agents-error-jitter.png")
-    learning_picture(given.study, given.out / "images" / "agents-learning.png")
+    with matplotlib.rc_context(plot_theme("dusk")):
+        curve_picture(cells, given.out / "images" / "agents-error-jitter.png")
+        learning_picture(given.study, given.out / "images" / "agents-learning.png")
 
 
 if __name__ == "__main__":

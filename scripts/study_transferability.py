@@ -119,7 +119,7 @@ def main() -> None:
         from syda_gym.evaluation.prediction.study import validate
 
         result = validate()
-        write_bytes(arguments.picture, prediction_png(result))
+        write_bytes(arguments.picture, prediction_png(result, ground="dusk"))
         study = result.as_dict()
     errors = {tuple(route["bodies"]): route["error"] for route in study["routes"]}
     training = {tuple(r["bodies"]): -r["predicted"]["training_error"] for r in study["routes"] if len(r["bodies"]) == 2}

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 __all__ = [
     "COMMAND",
     "GROUND",
+    "GROUNDS",
     "LEFT",
     "LIGHT_AMBIENT",
     "LIGHT_DIFFUSE",
@@ -20,7 +23,9 @@ __all__ = [
     "ROBOT_SHELL",
     "SKY_BOTTOM",
     "SKY_TOP",
+    "Ground",
     "hex_of",
+    "plot_theme",
     "rgb",
     "rgba",
 ]
@@ -44,6 +49,23 @@ SKY_BOTTOM: Colour = (0.86, 0.89, 0.94)
 NIGHT_SKY: Colour = (0.098, 0.125, 0.165)
 NIGHT_GROUND: Colour = (0.16, 0.20, 0.25)
 """The same on dark pages."""
+
+
+class Ground(NamedTuple):
+    """What bodies stand on and before, and the colour of words on it."""
+
+    sky_top: Colour
+    sky_bottom: Colour
+    floor: Colour
+    ink: Colour
+
+
+GROUNDS = {
+    "day": Ground(SKY_TOP, SKY_BOTTOM, GROUND, (0.16, 0.19, 0.24)),
+    "night": Ground(NIGHT_SKY, NIGHT_SKY, NIGHT_GROUND, (0.88, 0.91, 0.94)),
+    "dusk": Ground((0.31, 0.36, 0.44), (0.42, 0.47, 0.55), (0.37, 0.41, 0.48), (0.97, 0.98, 1.0)),
+}
+"""Grounds by name: for light pages, for dark ones, and one for films and pictures that stand on both."""
 LIGHT_FROM = (1.5, 0.9, 2.2)
 """Where the light stands: before the scene, to its left, above."""
 LIGHT_AMBIENT, LIGHT_DIFFUSE, LIGHT_SPECULAR = 0.62, 0.40, 0.06
@@ -60,6 +82,31 @@ PERSON: dict[str, Colour] = {
     "eyes": (0.10, 0.11, 0.14),
 }
 """What the figure of a person wears."""
+
+
+def plot_theme(ground: str = "day") -> dict[str, Any]:
+    """Matplotlib's settings for plots.
+
+    Args:
+        ground: ``"day"`` is white, ``"night"`` the report's dark card, ``"dusk"`` has no ground at all and letters that
+            can be read on white and on black.
+
+    Returns:
+        What ``matplotlib.rc_context`` takes.
+    """
+    if ground == "day":
+        return {"figure.facecolor": "white"}
+    # Ink, softer lines, ground, grid and the panes of boxes in space; dark ones as in the report's style sheet.
+    ink, soft, card, grid, pane = {
+        "night": ("#e6ebf2", "#9aa7b8", "#19202a", "#3a4656", (0.14, 0.18, 0.23, 0.6)),
+        "dusk": ("#76808d", "#76808d", "none", "#8a94a1", (0.5, 0.55, 0.6, 0.10)),
+    }[ground]
+    names = ("text.color", "axes.labelcolor", "axes.titlecolor", "xtick.color", "ytick.color")
+    panes = {f"axes3d.{axis}axis.panecolor": pane for axis in "xyz"}
+    return {
+        **dict.fromkeys(names, ink), **panes, "axes.edgecolor": soft, "figure.facecolor": card, "axes.facecolor": card,
+        "savefig.facecolor": card, "legend.facecolor": card, "legend.edgecolor": soft, "grid.color": grid,
+    }  # fmt: skip
 
 
 def rgb(colour: str) -> Colour:

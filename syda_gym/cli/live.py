@@ -35,6 +35,7 @@ from syda_gym.cli.options import (
     mapping_of,
     route_of,
 )
+from syda_gym.cli.reading import Reading, with_reading
 from syda_gym.cli.shared import console, say_written, show_table
 from syda_gym.cli.spellings import Program
 
@@ -140,6 +141,7 @@ def _robot_list() -> None:
     show_table(("name", "arms", "joints", "reach [m]", "URDF"), rows)
 
 
+@with_reading
 def teleop(
     operator: OperatorOption = None,
     robot: RobotOption = None,
@@ -197,8 +199,13 @@ def teleop(
     view_address: ViewAddressOption = DEFAULT_VIEW,
     appearance: AppearanceOption = None,
     model: ModelOption = None,
+    *,
+    reading: Reading,
 ) -> None:
-    """Drive a robot live: calibrate, map, filter, keep to limits and speeds, avoid self-collision, send."""
+    """Drive a robot live: calibrate, map, filter, keep to limits and speeds, avoid self-collision, send.
+
+    What is said of a recording (`--joints`, `--unit`, ...) is said of the one that `--source replay:FILE` plays.
+    """
     from syda_gym.routes.piloting.choice import choose_mapping
     from syda_gym.teleoperation.addresses import read_token
     from syda_gym.teleoperation.journal import replay_journal as decide_anew
@@ -206,6 +213,7 @@ def teleop(
     from syda_gym.teleoperation.tick import LoopSettings
 
     say = console()
+    how = reading.how()
     leader, follower = ends_of(operator, robot, route)
     named, preset = mapping_of(method, preset, mapping)
     stored_or_method = named if method or preset or mapping else "auto"
@@ -244,6 +252,7 @@ def teleop(
             repeat=repeat,
             origins=tuple(origin or ()),
             model=model,
+            how=how,
             journal=journal,
             note={"mapping": stored_or_method, "motions": motions, "route": route, "source": source},
             seconds=seconds,

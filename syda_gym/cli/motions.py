@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -10,20 +11,14 @@ import typer
 from syda_gym.cli import checks
 from syda_gym.cli.options import (
     DEFAULT_VIEW,
-    FpsOption,
-    JointsOption,
     JsonOption,
-    LayoutOption,
     OutFolderOption,
-    PersonOption,
     PictureOption,
     SpecArgument,
-    UnitOption,
-    UpOption,
     ViewAddressOption,
     ViewOption,
-    said_of,
 )
+from syda_gym.cli.reading import Reading, with_reading
 from syda_gym.cli.shared import console, print_json, say_written, show_table
 from syda_gym.cli.spellings import Program
 
@@ -33,27 +28,24 @@ motions_app = Program(help="Look at recordings, check paired data sets, convert 
 
 
 @motions_app.command("info")
+@with_reading
 def _motions_info(
     spec: SpecArgument,
     picture: PictureOption = None,
     as_json: JsonOption = False,
-    fps: FpsOption = None,
-    joints: JointsOption = None,
-    unit: UnitOption = None,
-    up: UpOption = None,
-    person: PersonOption = None,
-    layout: LayoutOption = None,
     view: ViewOption = False,
     view_address: ViewAddressOption = DEFAULT_VIEW,
+    *,
+    reading: Reading,
 ) -> None:
     """Say what a recording holds: bodies, actions, rate, gaps, and the units and axes that were found."""
     import warnings
 
-    from syda_gym.motions import MotionWarning, describe, load_motions
+    from syda_gym.motions import MotionWarning, describe
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MotionWarning)  # the notes below say the same
-        loaded = load_motions(spec, fps=fps, **said_of(joints, unit, up, person, layout))
+        loaded = reading.how().load(spec)
         info = describe(loaded, picture=picture)
     if as_json:
         print_json(info.to_dict())
@@ -111,28 +103,25 @@ def _motions_check(
 
 
 @motions_app.command("convert")
+@with_reading
 def _motions_convert(
     spec: SpecArgument,
     out: Annotated[
         Path,
         typer.Option("--out", "-o", help="An `.npz` file, or a folder for a data set.", callback=checks.npz_or_folder),
     ],
-    fps: FpsOption = None,
     operator: Annotated[
         str, typer.Option(help="Re-express the recorded operator as this human of the catalog, say `adult`.")
     ] = "",
-    joints: JointsOption = None,
-    unit: UnitOption = None,
-    up: UpOption = None,
-    person: PersonOption = None,
-    layout: LayoutOption = None,
+    *,
+    reading: Reading,
 ) -> None:
     """Convert a recording into a motion file or a data set folder."""
     from syda_gym.embodiments import HumanSkeleton, catalog
     from syda_gym.errors import EmbodimentError
-    from syda_gym.motions import conformed, load_motions, save_motions, write_dataset
+    from syda_gym.motions import conformed, save_motions, write_dataset
 
-    motions = load_motions(spec, fps=fps, **said_of(joints, unit, up, person, layout))
+    motions = reading.how().load(spec)
     if operator:
         body = catalog.get(operator)
         if not isinstance(body, HumanSkeleton):
@@ -143,6 +132,7 @@ def _motions_convert(
 
 
 @motions_app.command("pair")
+@with_reading
 def _motions_pair(
     operators: Annotated[str, typer.Argument(help="A folder of the operator's recordings, or one file.")],
     prompts: Annotated[str, typer.Argument(help="What the robot played: `embedded`, `format:PATH`, or a path.")],
@@ -154,16 +144,22 @@ def _motions_pair(
             help="Largest shift in time either way [s].", callback=checks.between(0.0, 60.0, "s", open_low=True)
         ),
     ] = 1.0,
-    fps: FpsOption = None,
     same_clock: Annotated[bool, typer.Option(help="Both have timestamps of one clock.")] = False,
+    *,
+    reading: Reading,
 ) -> None:
-    """Pair an operator's recordings with a robot's prompts by name, align them in time, and judge every action."""
+    """Pair an operator's recordings with a robot's prompts by name, align them in time, and judge every action.
+
+    What is said of the file (`--joints`, `--unit`, ...) is said of all the operator's recordings, not of the prompts;
+    `--fps` is the rate of the pairs, too.
+    """
     from syda_gym.motions import load_motions, operator_clips, pair_session, write_dataset
 
+    how = reading.how()
     played = load_motions(prompts).clips(robot)
-    session = pair_session(
-        operator_clips(operators), played, fps=fps, max_lag=max_lag, same_clock=same_clock, name=out.name
-    )
+    # Files of one clock have times, which a new rate would take away before they are compared.
+    clips = operator_clips(operators, how=replace(how, fps=None) if same_clock else how)
+    session = pair_session(clips, played, fps=how.fps, max_lag=max_lag, same_clock=same_clock, name=out.name)
     write_dataset(session.motions, out)
     rows = []
     for entry in session.quality:

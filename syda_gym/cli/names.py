@@ -33,7 +33,7 @@ BODIES = ("adult", "kid", "pepper", "nao", "child", "left_only", "long_arms", "s
 """Bodies of the catalog; robots that the user added come to them."""
 
 FORMATS = (
-    "paper", "pairs", "npz", "bvh", "c3d", "bag", "kinect", "azure", "openni", "film", "mediapipe", "keypoints",
+    "paper", "pairs", "npz", "bvh", "c3d", "mvnx", "bag", "kinect", "azure", "openni", "film", "mediapipe", "keypoints",
     "table",
 )  # fmt: skip
 """Prefixes of ``format:PATH``; see ``syda-gym motions formats``."""

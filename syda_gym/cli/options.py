@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -75,7 +75,6 @@ __all__ = [
     "mapping_of",
     "pairs_of",
     "route_of",
-    "said_of",
     "sensors_of",
 ]
 
@@ -310,25 +309,6 @@ def mapping_of(method: str | None, preset: str | None, mapping: Path | None) -> 
             f"method {name!r} has no preset {chosen!r}; {nearest_name(chosen, METHODS[name])}", param_hint="'--preset'"
         )
     return name, chosen
-
-
-def said_of(
-    joints: list[str] | None, unit: str | None, up: str | None, person: int | None, layout: Path | None
-) -> dict[str, Any]:
-    """What a person says about a recording, as ``load_motions`` takes it."""
-    from syda_gym.errors import OptionError
-
-    pairs = [text.partition("=") for text in joints or ()]
-    for name, sign, place in pairs:
-        if not sign or not name or not place:
-            raise OptionError(f"--joints {name}{sign}{place}: expected JOINT=PLACE, for example LShoulder=LeftArm")
-    return {
-        "joints": {name: place for name, _, place in pairs} or None,
-        "unit": unit,
-        "up": up,
-        "person": person,
-        "layout": layout,
-    }
 
 
 def sensors_of(values: list[str] | None) -> dict[str, float] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -25,11 +25,16 @@ from syda_gym.cli.options import (
     pairs_of,
     sensors_of,
 )
+from syda_gym.cli.reading import Reading, with_reading
 from syda_gym.cli.shared import interruptible, print_json, print_table, stages
+
+if TYPE_CHECKING:
+    from syda_gym.motions import Motions
 
 __all__ = ["route", "transferability"]
 
 
+@with_reading
 def transferability(
     bodies: BodiesArgument = None,
     definition: DefinitionOption = "dry_run",
@@ -41,6 +46,8 @@ def transferability(
     picture: PictureOption = None,
     seed: SeedOption = 0,
     as_json: JsonOption = False,
+    *,
+    reading: Reading,
 ) -> None:
     """Predict how well each body can follow each other one, before anything is recorded.
 
@@ -54,13 +61,14 @@ def transferability(
     from syda_gym.files import write_bytes
     from syda_gym.routes.metric import transferability as measure
 
+    recorded = reading.read(motions)
     if validate:
         from syda_gym.evaluation.prediction.study import validate as measure_prediction
 
         words = {"fit": "Fitting every pair and fold", "chains": "Scoring every chain"}
         with interruptible("nothing was kept; run the command again"), stages(words) as tell:
             study = measure_prediction(
-                motions, bodies=bodies or None, folds=folds, max_hops=max_hops or 3, seed=seed, progress=tell
+                recorded, bodies=bodies or None, folds=folds, max_hops=max_hops or 3, seed=seed, progress=tell
             )
         tables = [prediction_table(study), *([prediction_table(study, full=True)] if study.full_scores else [])]
         if picture:
@@ -81,7 +89,7 @@ def transferability(
     if len(names) == 1:  # one body: how it leads and follows the others
         pairs = [(a, b) for a, b in pairs if distinct[0] in (a, b)]
     kind: Any = definition  # checked, with the nearest name, where it is used
-    options = _plan_of(motions, sensor) if kind == "dry_run" else {}
+    options = _plan_of(recorded, sensor) if kind == "dry_run" else {}
     links = [measure(a, b, kind, seed=seed, **options) for a, b in pairs]
     if picture:
         from syda_gym.routes.pictures import clouds_png
@@ -90,6 +98,7 @@ def transferability(
     print_json([link.as_dict() for link in links]) if as_json else print_table(links_table(links))
 
 
+@with_reading
 def route(
     operator: OperatorOption = None,
     robot: RobotOption = None,
@@ -109,6 +118,8 @@ def route(
     suggest: Annotated[bool, typer.Option("--suggest", help="Also say which pair to record next.")] = False,
     picture: PictureOption = None,
     as_json: JsonOption = False,
+    *,
+    reading: Reading,
 ) -> None:
     """Choose the chain of bodies from operator to robot that is expected to do best.
 
@@ -121,24 +132,25 @@ def route(
 
     kind: Any = definition  # checked, with the nearest name, where it is used
     source, target = ends_of(operator, robot)
-    fitted, bodies = _fitted_pairs(pairs_of(pairs), motions)
+    recorded = reading.read(motions)
+    fitted, bodies = _fitted_pairs(pairs_of(pairs), recorded)
     options: dict[str, Any] = {"predictor": predictor}
     if predictor in (None, "dry_run") and kind in (None, "dry_run"):
-        options |= _plan_of(motions, sensor)
+        options |= _plan_of(recorded, sensor)
         if noise:
-            options["sensor"] = {**_seen_noise(motions, fitted), **(options["sensor"] or {})}
+            options["sensor"] = {**_seen_noise(recorded, fitted), **(options["sensor"] or {})}
     elif noise:
         from syda_gym.evaluation.prediction.study import motion_noise
         from syda_gym.motions.loading import load_motions
         from syda_gym.routes.noise import alpha_from_noise
 
-        options["alpha"] = alpha_from_noise(motion_noise(load_motions(motions)))
+        options["alpha"] = alpha_from_noise(motion_noise(load_motions(recorded)))
     if predictor == "measured":
         from syda_gym.routes.measured import measure_bodies
 
         named = [(getattr(a, "name", a), getattr(b, "name", b)) for a, b in fitted]
         with stages({"fit": "Fitting pairs to measure bodies"}) as tell:
-            options["predictor"] = measure_bodies(motions, named, progress=tell)
+            options["predictor"] = measure_bodies(recorded, named, progress=tell)
     known = {getattr(body, "name", body) for pair in fitted for body in pair}
     for name in (source, target):
         if name not in known:
@@ -167,12 +179,12 @@ def route(
         print_table(suggestions_table(further, spanning))
 
 
-def _plan_of(motions: str, sensor: list[str] | None) -> dict[str, Any]:
+def _plan_of(motions: str | Motions, sensor: list[str] | None) -> dict[str, Any]:
     """Options of the dry run: the user's motions beside those that come along, and the noise of sensors."""
     return {"motions": None if motions == "embedded" else motions, "sensor": sensors_of(sensor)}
 
 
-def _seen_noise(motions: str, fitted: list[tuple[Any, Any]]) -> dict[str, float]:
+def _seen_noise(motions: str | Motions, fitted: list[tuple[Any, Any]]) -> dict[str, float]:
     """What the recordings say about the sensors of the bodies in question [m]."""
     from syda_gym.motions.loading import load_motions
     from syda_gym.routes.noise import sensor_noise
@@ -182,7 +194,7 @@ def _seen_noise(motions: str, fitted: list[tuple[Any, Any]]) -> dict[str, float]
     return sensor_noise(recorded, [name for name in names if name in recorded.bodies])
 
 
-def _fitted_pairs(pairs: list[tuple[str, str]], motions: str) -> tuple[list[tuple[Any, Any]], list[Any]]:
+def _fitted_pairs(pairs: list[tuple[str, str]], motions: str | Motions) -> tuple[list[tuple[Any, Any]], list[Any]]:
     """Pairs as the user named them, or all that were recorded together; and everybody who can be paired."""
     from syda_gym.motions.loading import load_motions
 

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.errors import OptionError
+from syda_gym.errors import OptionError, nearest_name
 from syda_gym.evaluation.report.figures import Shape, Track
 from syda_gym.files import atomic_path
-from syda_gym.look import GROUND, LIGHT_FROM, NIGHT_GROUND, NIGHT_SKY, SKY_TOP
+from syda_gym.look import GROUNDS, LIGHT_FROM
 
 __all__ = ["draw", "png_bytes", "write_png"]
 
@@ -37,7 +37,8 @@ def draw(
     size: tuple[int, int] = (960, 540),
     turn: float = 0.35,
     finer: int = 2,
-    dark: bool = False,
+    ground: str = "day",
+    letters: int | None = None,
 ) -> Image:
     """Draws bodies side by side at one frame.
 
@@ -49,22 +50,26 @@ def draw(
         size: width and height [pixels], even numbers.
         turn: how far the camera stands to the side [rad].
         finer: pixels are drawn this much finer and averaged; 1 is four times as fast and has jagged edges.
-        dark: for a dark page.
+        ground: one of ``look.GROUNDS``: ``day`` for light pages, ``night`` for dark ones, ``dusk`` for both.
+        letters: height of words [pixels]; by default a 32nd of the picture's, at least 12. A label may have lines.
 
     Returns:
         ``(height, width, 3)`` uint8.
 
     Raises:
-        OptionError: no body, or a size that is not positive and even.
+        OptionError: no body, a size that is not positive and even, or an unknown ground.
     """
     if not tracks or min(size) < 16 or size[0] % 2 or size[1] % 2:
         raise OptionError(f"draw needs at least one body and an even size, got {len(tracks)} bodies and {size}")
+    if ground not in GROUNDS:
+        raise OptionError(f"unknown ground {ground!r}; {nearest_name(ground, GROUNDS)}")
+    stage = GROUNDS[ground]
     width, height = size[0] * finer, size[1] * finer
     tall = max(track.height for track in tracks) + 0.35
     span = _SPACING * len(tracks) + 0.4
     scale = min(height / (tall + 0.25), width / span)  # pixels a metre
     camera = _camera(turn, 0.16)
-    colour = _ground(width, height, *((NIGHT_SKY, NIGHT_GROUND) if dark else (SKY_TOP, GROUND)))
+    colour = _ground(width, height, stage.sky_top, stage.floor)
     depth = np.full((height, width), -np.inf)
     for index, track in enumerate(tracks):
         shift = np.array([0.0, (index - (len(tracks) - 1) / 2) * _SPACING, 0.0])
@@ -78,7 +83,7 @@ def draw(
         for i in range(len(tracks))
     ]
     places = [(x / finer, y / finer) for x, y in places]
-    return _write_words(image, places, labels or [track.name for track in tracks], title, dark)
+    return _write_words(image, places, labels or [track.name for track in tracks], title, stage.ink, letters)
 
 
 def write_png(image: Image, path: str | os.PathLike[str]) -> Path:
@@ -263,17 +268,22 @@ _INTERSECT = {"sphere": _hit_sphere, "cylinder": _hit_cylinder, "box": _hit_box}
 
 
 def _write_words(
-    image: Image, places: list[tuple[float, float]], labels: Sequence[str], title: str, dark: bool
+    image: Image,
+    places: list[tuple[float, float]],
+    labels: Sequence[str],
+    title: str,
+    colour: Sequence[float],
+    letters: int | None,
 ) -> Image:
     from PIL import Image as Pillow
     from PIL import ImageDraw, ImageFont
 
     picture = Pillow.fromarray(image)
     pen = ImageDraw.Draw(picture)
-    ink = (225, 231, 240) if dark else (40, 48, 60)
-    font = ImageFont.load_default(size=max(12, image.shape[0] // 32))
+    ink = tuple(round(255 * part) for part in colour)
+    font = ImageFont.load_default(size=letters or max(12, image.shape[0] // 32))
     for (x, y), label in zip(places, labels, strict=True):
-        pen.text((x, y + image.shape[0] // 60), label, fill=ink, font=font, anchor="ma")
+        pen.text((x, y + image.shape[0] // 60), label, fill=ink, font=font, anchor="ma", align="center")
     if title:
         pen.text((image.shape[1] // 60, image.shape[0] // 40), title, fill=ink, font=font)
     return np.asarray(picture)

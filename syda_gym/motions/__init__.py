@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from syda_gym.motions.clip import Take as Take
     from syda_gym.motions.dataset import read_dataset as read_dataset
     from syda_gym.motions.dataset import write_dataset as write_dataset
+    from syda_gym.motions.how_to_read import HowToRead as HowToRead
     from syda_gym.motions.info import MotionsInfo as MotionsInfo
     from syda_gym.motions.info import describe as describe
     from syda_gym.motions.loading import FORMATS as FORMATS
@@ -40,6 +41,7 @@ _LAZY = {
     "Alignment": "pairing.alignment",
     "FORMATS": "loading",
     "Finding": "pairing.dataset_check",
+    "HowToRead": "how_to_read",
     "MotionClip": "clip",
     "MotionWarning": "readers.skeleton",
     "Motions": "clip",
@@ -72,6 +74,7 @@ __all__ = [
     "ActionQuality",
     "Alignment",
     "Finding",
+    "HowToRead",
     "MotionClip",
     "MotionWarning",
     "Motions",

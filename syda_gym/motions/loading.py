@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import lru_cache
 from itertools import islice
@@ -20,11 +20,14 @@ from syda_gym.motions.film.reader import ENDINGS, is_film, read_film
 from syda_gym.motions.readers.bvh.read import is_bvh, read_bvh
 from syda_gym.motions.readers.captures.bag import is_bag, read_bag
 from syda_gym.motions.readers.captures.c3d import is_c3d, read_c3d
+from syda_gym.motions.readers.captures.mvnx import is_mvnx, read_mvnx
 from syda_gym.motions.readers.dispatch import read_azure, read_keypoints, read_mediapipe
 from syda_gym.motions.readers.landmarks.arrays import is_arrays
 from syda_gym.motions.readers.landmarks.read import is_json
 from syda_gym.motions.readers.own.npz import read_npz
 from syda_gym.motions.readers.own.paper import read_paper
+from syda_gym.motions.readers.own.people import doubts
+from syda_gym.motions.readers.recording import say
 from syda_gym.motions.readers.said import told
 from syda_gym.motions.readers.tables.read import is_table, read_kinect, read_openni, read_table
 from syda_gym.motions.readers.text import first_bytes
@@ -101,14 +104,24 @@ def load_motions(
         return motions if fps is None else resampled(motions, fps)
     chosen, path = _format_and_path(os.fspath(spec))
     if chosen.name == "paper" and fps is not None and not speaks:
-        return read_paper(path, fps)
+        return _doubted(read_paper(path, fps), path)
     if speaks and not chosen.listens:
         raise OptionError(
             f"{path} is of the format {chosen.name!r}, which says joints, units and axes itself; leave them out"
         )
     motions = chosen.read(path, said) if chosen.listens else chosen.read(path)
+    if chosen.name in _OWN:
+        motions = _doubted(motions, path)
     rate = fps if fps is not None else said.fps
     return motions if rate is None else resampled(motions, rate)
+
+
+def _doubted(motions: Motions, path: Path) -> Motions:
+    """The same motions; what is odd about their people is noted and said aloud, as foreign readers do."""
+    odd = doubts(motions)
+    for line in odd:
+        say(f"{path}: {line}")
+    return replace(motions, notes=tuple(dict.fromkeys((*motions.notes, *odd)))) if odd else motions
 
 
 @lru_cache(maxsize=1)
@@ -132,7 +145,29 @@ def _format_and_path(text: str) -> tuple[Format, Path]:
     for chosen in FORMATS.values():
         if path.suffix.lower() in chosen.endings:  # not what its ending says: its reader knows what is wrong with it
             return chosen, path
-    raise MotionError(f"{path} is of no known format ({', '.join(FORMATS)}); name it as format:PATH")
+    raise MotionError(_unknown(path))
+
+
+def _unknown(path: Path) -> str:
+    """What to say about a path that nothing reads."""
+    if path.is_dir():
+        inside = sorted(entry.name for entry in islice(path.iterdir(), 1000) if entry.is_file())
+        if not inside:
+            return f"{path} is an empty folder; expected a recording"
+        if sum(name.endswith("_keypoints.json") for name in inside) > 0.5 * len(inside):
+            return (
+                f"{path} holds one file a frame, as OpenPose writes them. Places in a picture have no depth: use a "
+                "tracker that gives positions in space, or read the film itself, film:FILE; files with "
+                "pose_keypoints_3d can be joined into one list of frames"
+            )
+        return (
+            f"{path} is a folder and no data set of this library; name one of its files, such as "
+            f"{path / inside[0]}, or pair them all: syda-gym motions pair"
+        )
+    remedy = _ELSEWHERE.get(path.suffix.lower())
+    if remedy is not None:
+        return f"{path}: {path.suffix} files are not read; {remedy}"
+    return f"{path} is of no known format ({', '.join(FORMATS)}); name it as format:PATH"
 
 
 def _meant(text: str) -> str:
@@ -179,6 +214,7 @@ FORMATS: dict[str, Format] = {
         Format("npz", "a file written by save_motions", (".npz",), read_npz, _is_npz),
         Format("bvh", "motion capture as a tree of joints", (".bvh",), read_bvh, is_bvh, True),
         Format("c3d", "motion capture as markers (extra c3d)", (".c3d",), read_c3d, is_c3d, True),
+        Format("mvnx", "Xsens MVN: where segments begin, as XML", (".mvnx",), read_mvnx, is_mvnx, True),
         Format("bag", "ROS 1 and 2 bags, MCAP: tf or markers (extra ros)", (".bag", ".mcap", ".db3"), read_bag,
         is_bag, True),
         Format("kinect", "Kinect v1 and v2: 20 or 25 joints a line", (), read_kinect, _never, True),
@@ -194,3 +230,15 @@ FORMATS: dict[str, Format] = {
     )
 }  # fmt: skip
 """Known formats by prefix, in the order in which a file is tried."""
+
+_OWN = ("paper", "pairs", "npz")  # whose readers make no person of joints, but take the bodies that the file names
+
+_ELSEWHERE = {
+    **dict.fromkeys((".fbx", ".asf", ".amc", ".usd", ".glb", ".vrm", ".vmd"), "export BVH from the tool that made it"),
+    **dict.fromkeys((".pkl", ".pickle", ".pt", ".pth", ".joblib"), "such a file can run code when it is opened: save "
+                    "joint positions as npz or CSV"),
+    **dict.fromkeys((".mat", ".h5", ".hdf5", ".parquet"), "save joint positions as npz or CSV"),
+    **dict.fromkeys((".xlsx", ".xls", ".ods"), "save the sheet as CSV"),
+    **dict.fromkeys((".mot", ".sto", ".trb"), "they hold angles or are binary: export marker positions as TRC or C3D"),
+}  # fmt: skip
+"""What helps with files that other tools write and nothing here reads, by their ending."""

@@ -11,6 +11,7 @@ from syda_gym.errors import MotionError, SydaError
 from syda_gym.files import user_folder
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.dataset import INDEX, read_dataset
+from syda_gym.motions.readers.own.people import doubts
 
 __all__ = ["Recorded", "joined", "new_recording", "recorded", "recordings_folder"]
 
@@ -22,7 +23,7 @@ class Recorded:
     Attributes:
         motions: all usable takes, ``None`` if there are none.
         folders: the data sets that they are from.
-        notices: data sets that were left out, each with the reason.
+        notices: data sets that were left out, each with the reason, and what is odd about those that were not.
     """
 
     motions: Motions | None
@@ -66,6 +67,7 @@ def recorded() -> Recorded:
             )
             notices.append(f"{index.parent} left out: {why}; name it as motions to use it")
             continue
+        notices += [f"{index.parent}: {line}" for line in doubts(motions)]
         kept.append(replace(motions, name=index.parent.name))
         folders.append(index.parent)
     return Recorded(joined(kept, "your recordings") if kept else None, tuple(folders), tuple(notices))

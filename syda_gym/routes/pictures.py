@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.look import plot_theme
 from syda_gym.routes import general, paper
 from syda_gym.routes.general import Sampling
 from syda_gym.routes.metric import Definition, Transferability, pair_arms, transferability
@@ -26,8 +27,8 @@ from syda_gym.routes.workspace.store import MEMORY, WorkspaceStore
 __all__ = ["clouds_png", "graph_png"]
 
 _SUFFICIENT, _LACKING, _OUT_OF_REACH = "#2c7fb8", "#e6842a", "#b5b5b5"
-_ROUTE, _TIE, _FITTED, _OTHER = "#c02942", "#e08a9b", "#4a5a6a", "#c4ccd4"
-_HUMAN, _ROBOT = "#fbe3c0", "#cfe3f2"
+_ROUTE, _TIE, _FITTED, _OTHER = "#c02942", "#e08a9b", "#64768a", "#c4ccd4"
+_HUMAN, _ROBOT, _ON_NODES = "#fbe3c0", "#cfe3f2", "#1c222b"
 _MOST_LABELS = 24
 
 # From the midline, a little from the front and above: forward points to the right, the cut faces the eye.
@@ -43,7 +44,7 @@ def clouds_png(
     seed: int = 0,
     store: WorkspaceStore = MEMORY,
     width: float = 13.0,
-    dark: bool = False,
+    ground: str = "day",
 ) -> bytes:
     """Draws where both bodies' arms move how easily, and where the target suffices, lacks or cannot reach.
 
@@ -59,7 +60,7 @@ def clouds_png(
         seed: their seed.
         store: where sampled workspaces are kept.
         width: width of the picture in inches, at 100 dots per inch; below 6 the lower row alone, for a phone.
-        dark: on a dark page.
+        ground: ``"day"`` for light pages, ``"night"`` for dark ones, ``"dusk"`` for both (see ``look.plot_theme``).
 
     Returns:
         PNG bytes.
@@ -71,7 +72,7 @@ def clouds_png(
 
     a, b = _workspaces(source, target, definition, samples, seed, store)
     result = transferability(source, target, definition, store=store)
-    with matplotlib.rc_context(_theme(dark)):
+    with matplotlib.rc_context(plot_theme(ground)):
         return (
             _draw_narrow(a, b, result, definition, width)
             if width < 6.0
@@ -88,7 +89,7 @@ def _draw_wide(a: Workspace, b: Workspace, result: Transferability, definition: 
         5,
         width_ratios=(1.0, 1.0, 0.04, 0.12, 1.0),
         left=0.05,
-        right=0.985,
+        right=0.965,
         top=0.9,
         bottom=0.07,
         wspace=0.3,
@@ -143,19 +144,6 @@ def _draw_narrow(a: Workspace, b: Workspace, result: Transferability, definition
     return _png(figure)
 
 
-def _theme(dark: bool) -> Any:
-    """Matplotlib's colours for a light or a dark page."""
-    if not dark:
-        return {"figure.facecolor": "white"}
-    ink, soft, card = "#e6ebf2", "#9aa7b8", "#19202a"  # as in the report's style sheet
-    names = ("text.color", "axes.labelcolor", "axes.titlecolor", "xtick.color", "ytick.color")
-    panes = {f"axes3d.{axis}axis.panecolor": (0.14, 0.18, 0.23, 0.6) for axis in "xyz"}
-    return {
-        **dict.fromkeys(names, ink), **panes, "axes.edgecolor": soft, "figure.facecolor": card, "axes.facecolor": card,
-        "savefig.facecolor": card, "legend.facecolor": card, "legend.edgecolor": soft, "grid.color": "#3a4656",
-    }  # fmt: skip
-
-
 def graph_png(
     graph: BodyGraph,
     route: Route | None = None,
@@ -163,6 +151,7 @@ def graph_png(
     ties: Sequence[Route] = (),
     width: float = 10.0,
     height: float = 6.5,
+    ground: str = "day",
 ) -> bytes:
     """Draws bodies, fitted pairs with T both ways, and the chosen route (after Fig. 4 and 7 of the paper).
 
@@ -172,21 +161,29 @@ def graph_png(
         ties: further routes to draw lighter.
         width: inches, at 100 dots per inch.
         height: inches.
+        ground: as in ``clouds_png``.
 
     Returns:
         PNG bytes.
     """
+    import matplotlib
+
+    with matplotlib.rc_context(plot_theme(ground)):
+        return _draw_graph(graph, route, ties, (width, height))
+
+
+def _draw_graph(graph: BodyGraph, route: Route | None, ties: Sequence[Route], size: tuple[float, float]) -> bytes:
     import networkx
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), dpi=100, facecolor="white")
+    figure = Figure(figsize=size, dpi=100)
     axis = figure.add_subplot()
     net = graph.graph
     places = _places(graph, route)
     chosen = _edges(route)
     light = {edge for other in (*ties, *(route.ties if route else ())) for edge in _edges(other)} - chosen
     for edges, color, wide in (
-        ([e for e in net.edges if e not in chosen | light], _FITTED if len(net.edges) <= _MOST_LABELS else _OTHER, 1.2),
+        ([e for e in net.edges if e not in chosen | light], _FITTED if len(net.edges) <= _MOST_LABELS else _OTHER, 1.4),
         (sorted(light), _TIE, 2.2),
         (sorted(chosen), _ROUTE, 3.2),
     ):
@@ -200,12 +197,13 @@ def graph_png(
         net, places, node_color=kinds, edgecolors=rims, linewidths=1.6, node_size=2600, ax=axis
     )
     labels = {name: "\n".join(textwrap.wrap(name.replace("_", " "), 11)) for name in net.nodes}
-    networkx.draw_networkx_labels(net, places, labels, font_size=8.5, ax=axis)
+    networkx.draw_networkx_labels(net, places, labels, font_size=8.5, font_color=_ON_NODES, ax=axis)
     labelled = list(net.edges) if len(net.edges) <= _MOST_LABELS else sorted(chosen | light)
     networkx.draw_networkx_edge_labels(
         net, places, {edge: f"{graph.link(*edge).T:.3f}" for edge in labelled}, font_size=8.5, ax=axis,
         label_pos=0.4, rotate=False, connectionstyle="arc3,rad=0.14",
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
+        font_color=_ON_NODES,
+        bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
     )  # fmt: skip
     if route is not None:
         worth = f"T = {route.T:.3f} ± {route.tolerance:.3f}"
@@ -278,6 +276,7 @@ def _draw_slice(axis: Any, plane: FloatArray, workspace: Workspace, top: float) 
 
 
 def _draw_regions(axis: Any, regions: list[tuple[str, str, NDArray[np.bool_]]], workspace: Workspace) -> None:
+    import matplotlib
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
@@ -293,7 +292,9 @@ def _draw_regions(axis: Any, regions: list[tuple[str, str, NDArray[np.bool_]]], 
     )  # fmt: skip
     total = max(1, sum(int(mask.sum()) for _, _, mask in regions))
     handles = [Patch(color=color, label=f"{label} {mask.sum() / total:.0%}") for label, color, mask in regions]
-    axis.legend(handles=handles, loc="lower left", fontsize=7.5, framealpha=0.9)
+    # It lies on the regions: without a ground of the page it brings its own.
+    own = {"facecolor": "#eef1f5", "labelcolor": _ON_NODES} if matplotlib.rcParams["legend.facecolor"] == "none" else {}
+    axis.legend(handles=handles, loc="lower left", fontsize=7.5, framealpha=0.92, **own)
 
 
 def _dress_cloud(axis: Any, title: str, definition: Definition) -> None:

@@ -11,7 +11,7 @@ from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import MotionError, OptionError, TeleoperationError, nearest_name
 from syda_gym.motions.clip import MotionClip
-from syda_gym.motions.loading import load_motions
+from syda_gym.motions.how_to_read import AS_IT_STANDS, HowToRead
 from syda_gym.teleoperation.incoming.camera import CameraSource, FilmSource
 from syda_gym.teleoperation.incoming.network import UdpSource, WebSocketSource
 from syda_gym.teleoperation.incoming.sources import ReplaySource, Source
@@ -52,6 +52,7 @@ def make_source(
     repeat: bool = False,
     origins: tuple[str, ...] = (),
     model: str | os.PathLike[str] | None = None,
+    how: HowToRead = AS_IT_STANDS,
 ) -> Source:
     """A source from its address.
 
@@ -65,14 +66,21 @@ def make_source(
         repeat: whether a replay begins again at its end.
         origins: web pages that may connect to a WebSocket.
         model: file of the pose model of cameras and films; ``None`` for the default place.
+        how: what a person says about the recording of a replay.
 
     Raises:
-        OptionError: no such kind of source, or a port that is none.
+        OptionError: no such kind of source, a port that is none, or something is said about a source that is no
+            recording.
         MotionError: a recording that cannot be replayed for this body.
     """
     kind, _, rest = spec.partition(":")
+    if kind in SOURCES and kind != "replay" and how.said:
+        raise OptionError(
+            f"{', '.join(how.said)} said of {spec!r}: only recordings need that; play one with replay:FILE, or leave "
+            "it out"
+        )
     if kind == "replay":
-        clips = _clips(rest or "embedded", body, actions)
+        clips = _clips(rest or "embedded", body, actions, how)
         return ReplaySource(clips, speed=speed, repeat=repeat, stand=_STAND * calibration)
     if kind == "udp":
         host, port = host_and_port(rest, 9870)
@@ -168,8 +176,8 @@ def _sink(spec: str, robot: Robot, token: str | None, rate: float, operator: Emb
     raise OptionError(f"unknown sink {spec!r}; {nearest_name(kind, SINKS)}")
 
 
-def _clips(spec: str, body: Embodiment, actions: Sequence[str]) -> list[MotionClip]:
-    motions = load_motions(spec)
+def _clips(spec: str, body: Embodiment, actions: Sequence[str], how: HowToRead) -> list[MotionClip]:
+    motions = how.load(spec)
     # A recording of somebody is replayed by whoever has the same joints; the calibration takes care of the size.
     names = [name for name, other in motions.bodies.items() if _fits(other, body)]
     if not names:

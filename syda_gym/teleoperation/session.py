@@ -10,6 +10,7 @@ from typing import Any
 
 from syda_gym.errors import OptionError, TeleoperationError
 from syda_gym.mappings.mapping import Mapping
+from syda_gym.motions.how_to_read import AS_IT_STANDS, HowToRead
 from syda_gym.teleoperation.addresses import make_sink, make_source
 from syda_gym.teleoperation.incoming.sources import Source
 from syda_gym.teleoperation.journal import Journal
@@ -44,6 +45,7 @@ def teleoperate(
     repeat: bool = False,
     origins: tuple[str, ...] = (),
     model: str | os.PathLike[str] | None = None,
+    how: HowToRead = AS_IT_STANDS,
     journal: str | os.PathLike[str] | None = None,
     note: dict[str, Any] | None = None,
     seconds: float | None = None,
@@ -63,6 +65,7 @@ def teleoperate(
         repeat: whether a replay begins again.
         origins: web pages that may connect to a WebSocket.
         model: file of the pose model of cameras and films; ``None`` for the default place.
+        how: what a person says about the recording of a replay.
         journal: file to write every decision to.
         note: free facts for the journal.
         seconds: when to end.
@@ -83,7 +86,7 @@ def teleoperate(
         if isinstance(source, Source)
         else make_source(
             source, mapping.source, token=token, speed=speed, actions=actions, calibration=chosen.calibration,
-            repeat=repeat, origins=origins, model=model,
+            repeat=repeat, origins=origins, model=model, how=how,
         )
     )  # fmt: skip
     probe = TeleoperationLoop(mapping, chosen)

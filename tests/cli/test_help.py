@@ -92,6 +92,18 @@ def test_one_option_is_one_thing_everywhere():
             assert now[1] == first[1], f"{long} differs between {first[0]} and {now[0]}"
 
 
+def test_whoever_takes_a_persons_file_takes_all_that_can_be_said_of_it():
+    said = {"--fps", "--joints", "--unit", "--up", "--person", "--layout"}
+    has = {
+        words: said & {opt for parameter in command.params for opt in parameter.opts} for words, command in ALL.items()
+    }
+    assert all(found in (set(), said) for found in has.values())
+    assert {" ".join(words) for words, found in has.items() if found} == {
+        "motions info", "motions convert", "motions pair", "teleop", "train", "tune", "evaluate", "play",
+        "transferability", "route",
+    }  # fmt: skip
+
+
 def test_no_old_spelling_is_an_option_still():
     options = {opt for command in ALL.values() for parameter in command.params for opt in parameter.opts}
     assert not options & {"--from", "--to", "--disturbance", "--prompts"}

@@ -117,6 +117,22 @@ REFUSED = [
     ("motions pair nowhere embedded --out set", "nowhere"),
     ("motions pair embedded embedded --out set --robot peper", "did you mean 'pepper'"),
     ("motions pair embedded embedded --out set --max-lag 0", "--max-lag"),
+    ("motions pair lab embedded --out set --joints LShoulder", "--joints"),
+    ("motions pair lab embedded --out set --joints LeftElbow=a", "did you mean 'LElbow'"),
+    ("motions pair lab.csv embedded --out set --unit furlong", "unit: expected one of"),
+    ("motions pair lab.csv embedded --out set --up sideways", "up: expected an axis"),
+    ("motions pair lab.csv embedded --out set --layout missing.yaml", "missing.yaml"),
+    ("motions pair embedded embedded --out set --unit mm", "these motions know their own"),
+    ("motions info embedded --person 0", "--person"),
+    ("teleop --method geometric --sink none --source replay:lab.csv --unit furlong", "unit: expected one of"),
+    ("teleop --method geometric --sink none --source replay:lab.csv --layout bad.yaml", "unknown key 'gamm'"),
+    ("teleop --method geometric --sink none --source replay:embedded --person 2", "these motions know their own"),
+    ("teleop --method geometric --sink none --source camera --unit mm --up z", "unit, up said of 'camera'"),
+    ("teleop --method geometric --sink none --source udp:9870 --fps 30", "only recordings need that"),
+    ("play --motions lab.csv --operator operator --unit furlong", "unit: expected one of"),
+    ("evaluate lead --motions embedded --joints LShoulder=a", "these motions know their own"),
+    ("transferability adult --motions lab.csv --up sideways", "up: expected an axis"),
+    ("route --motions lab.csv --unit furlong", "unit: expected one of"),
     ("demmo", "Did you mean 'demo'"),
     ("motions chek", "Did you mean 'check'"),
     ("play --metod syda", "--method"),
@@ -133,6 +149,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(folder)
     (folder / "a-file").write_text("here")
     (folder / "bad.yaml").write_text("gamm: 0.5\n")
+    (folder / "lab.csv").write_text("time,a,b,c\n0,1,2,3\n1,2,3,4\n")
     (folder / "nao.urdf").write_bytes(asset("robots", "nao.urdf").read_bytes())
     return folder
 

@@ -73,3 +73,18 @@ def test_bad_input_is_named():
         draw([_ball("sphere", (0.2,))], 0, size=(101, 100))
     with pytest.raises(OptionError, match="at least one body"):
         draw([], 0)
+
+
+@pytest.mark.parametrize(("ground", "low", "high"), [("day", 190, 256), ("night", 0, 80), ("dusk", 70, 150)])
+def test_grounds_for_light_and_dark_pages_and_for_both(ground, low, high):
+    """A film of the dusk is neither a white slab on a dark page nor a black one on a light page."""
+    ball = Track("", "robot", (Shape("sphere", (0.1,), (1.0, 0.0, 0.0)),), np.zeros((1, 0, 3)), np.zeros((1, 0, 7)), 1)
+    image = draw([ball], 0, labels=[""], size=(96, 64), ground=ground)
+    corners = image[[0, 0, -1, -1], [0, -1, 0, -1]].mean(axis=1)
+    assert (corners >= low).all()
+    assert (corners < high).all()
+
+
+def test_an_unknown_ground_is_refused():
+    with pytest.raises(OptionError, match="unknown ground 'dask'; did you mean 'dusk'"):
+        draw([_ball("sphere", (0.2,))], 0, ground="dask")

@@ -173,3 +173,26 @@ def bvh_text(names: tuple[str, ...] = CMU, angles: np.ndarray | None = None, sca
 
 def json_text(value: object) -> str:
     return json.dumps(value)
+
+
+MVNX_SEGMENTS = (
+    "Pelvis L5 L3 T12 T8 Neck Head RightShoulder RightUpperArm RightForeArm RightHand LeftShoulder LeftUpperArm "
+    "LeftForeArm LeftHand RightUpperLeg RightLowerLeg RightFoot RightToe LeftUpperLeg LeftLowerLeg LeftFoot LeftToe"
+)
+
+
+def mvnx_text(points: np.ndarray, *, rate: str = ' frameRate="60"', position: bool = True, before: str = "") -> str:
+    """An export of Xsens MVN of ``points`` ``(N, 23, 3)``: two poses of the calibration, then the frames at 60 Hz."""
+
+    def frame(kind: str, index: int, values: np.ndarray) -> str:
+        text = " ".join(f"{value:.6f}" for value in values.ravel())
+        place = f"<position>{text}</position>" if position else "<orientation>1 0 0 0</orientation>"
+        return f'<frame time="{round(1000 * index / 60)}" index="{index}" type="{kind}">{place}</frame>\n'
+
+    frames = "".join(frame(kind, 0, np.zeros(69)) for kind in ("identity", "tpose"))
+    frames += "".join(frame("normal", index, row) for index, row in enumerate(points))
+    labels = "".join(f'<segment label="{name}" id="{i + 1}"/>' for i, name in enumerate(MVNX_SEGMENTS.split()))
+    return (
+        f'<?xml version="1.0" encoding="UTF-8"?>{before}\n<mvnx xmlns="http://www.xsens.com/mvn/mvnx" version="4">'
+        f'<subject label="Anna"{rate}><segments>{labels}</segments><frames>{frames}</frames></subject></mvnx>'
+    )

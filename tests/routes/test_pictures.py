@@ -42,3 +42,16 @@ def test_the_route_is_drawn_in_its_colour() -> None:
 def test_pictures_repeat_bit_by_bit() -> None:
     graph = BodyGraph(fitted=FITTED, **FAST)
     assert graph_png(graph) == graph_png(graph)
+
+
+def test_on_dusk_there_is_no_ground_and_letters_can_be_read_on_white_and_on_black() -> None:
+    from PIL import Image
+
+    graph = BodyGraph(fitted=FITTED, **FAST)
+    image = np.asarray(Image.open(io.BytesIO(graph_png(graph, ground="dusk"))).convert("RGBA"))
+    assert (image[:5, :5, 3] == 0).all()
+    ink = image[(image[..., 3] == 255) & (np.ptp(image[..., :3].astype(int), axis=2) < 30)][:, :3].mean(axis=1)
+    letters = ink[(ink > 100) & (ink < 150)]
+    assert len(letters) > 100  # of the legend: neither white nor black
+    plain = np.asarray(Image.open(io.BytesIO(graph_png(graph))).convert("RGBA"))
+    assert (plain[:5, :5] == 255).all()

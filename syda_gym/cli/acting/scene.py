@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
-from functools import wraps
-from inspect import Parameter, signature
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from syda_gym.cli import checks
 from syda_gym.cli.names import REFERENCES
+from syda_gym.cli.option_groups import with_group
 from syda_gym.cli.options import (
     DisturbancesOption,
     HeldOutOption,
@@ -27,13 +26,20 @@ from syda_gym.cli.options import (
     mapping_of,
     route_of,
 )
+from syda_gym.cli.reading import Reading
+
+if TYPE_CHECKING:
+    from syda_gym.motions import Motions
 
 __all__ = ["Scene", "with_scene"]
 
 
 @dataclass(frozen=True)
-class Scene:
-    """The environment that a command acts in, as its user described it; the fields are options of the command."""
+class Scene(Reading):
+    """The environment that a command acts in, as its user described it; the fields are options of the command.
+
+    What is said of a recording is said of ``motions``.
+    """
 
     motions: MotionsOption = "embedded"
     operator: OperatorOption = None
@@ -64,8 +70,9 @@ class Scene:
         """Environment options; held-out actions are kept out of fits and, if ``training``, out of the motions."""
         mapping, preset = mapping_of(self.method, self.preset, self.mapping)
         operator, robot = ends_of(self.operator, self.robot, self.route)
+        motions = self.read(self.motions)
         options: dict[str, Any] = {
-            "motions": self.motions,
+            "motions": motions,
             "operator": operator,
             "robot": robot,
             "route": route_of(self.route),
@@ -77,7 +84,7 @@ class Scene:
             "history": self.history,
         }
         if self.held_out:
-            known = _actions(self.motions, self.held_out)
+            known = _actions(motions, self.held_out)
             options["held_out"] = tuple(self.held_out)
             options["actions"] = tuple(sorted(known - set(self.held_out)) if training else self.held_out)
         return options
@@ -92,36 +99,20 @@ def _stored(mapping: str) -> Any:
     return load_mapping(mapping)
 
 
-def _actions(motions: str, names: Sequence[str]) -> set[str]:
+def _actions(motions: str | Motions, names: Sequence[str]) -> set[str]:
     """All actions of the motions, if the named ones are among them."""
     from syda_gym.errors import nearest_name
     from syda_gym.motions.loading import load_motions
 
-    known = {take.action for take in load_motions(motions).takes}
+    loaded = load_motions(motions)
+    known = {take.action for take in loaded.takes}
     for name in names:
         if name not in known:
             raise typer.BadParameter(
-                f"{motions} has no action {name!r}; {nearest_name(name, known)}", param_hint="'--held-out'"
+                f"{loaded.name} has no action {name!r}; {nearest_name(name, known)}", param_hint="'--held-out'"
             )
     return known
 
 
-def with_scene(command: Callable[..., None]) -> Callable[..., None]:
-    """Gives a command that takes ``scene`` the options of a ``Scene`` in its place."""
-    hints = get_type_hints(Scene, include_extras=True)
-    scene = [
-        Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default, annotation=hints[field.name])
-        for field in fields(Scene)
-    ]
-    own = signature(command, eval_str=True)
-
-    @wraps(command)
-    def run(**given: Any) -> None:
-        command(scene=Scene(**{field.name: given.pop(field.name) for field in fields(Scene)}), **given)
-
-    kept = [parameter for name, parameter in own.parameters.items() if name != "scene"]
-    parameters = [*(parameter.replace(kind=Parameter.KEYWORD_ONLY) for parameter in kept), *scene]
-    # Typer reads both.
-    run.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return run
+with_scene = with_group("scene", Scene)
+"""Gives a command that takes ``scene`` the options of a ``Scene`` in its place."""

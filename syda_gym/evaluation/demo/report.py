@@ -97,7 +97,12 @@ def write_demo_report(
                     (folder / "side_by_side.png").read_bytes(),
                     variants=_other_pages(shown, middle, names),
                 ),
-                Picture("Film", (folder / "chains.mp4").read_bytes(), "video/mp4"),
+                Picture(
+                    "Film",
+                    (folder / "chains.mp4").read_bytes(),
+                    "video/mp4",
+                    variants={"poster": png_bytes(_still(shown, names, title, middle))},
+                ),
             ],
         ),
         Section("What this shows", [Text(line) for line in shows(result)]),
@@ -214,17 +219,19 @@ def _regions(result: DemoResult) -> Picture:
 
     operator = result.cast.operator
     bodies = result.motions.bodies[operator], result.robot
-    png, dark = (clouds_png(*bodies, dark=dark) for dark in (False, True))
-    narrow, narrow_dark = (clouds_png(*bodies, width=3.5, dark=dark) for dark in (False, True))
+    png, dark = (clouds_png(*bodies, ground=ground) for ground in ("day", "night"))
+    narrow, narrow_dark = (clouds_png(*bodies, width=3.5, ground=ground) for ground in ("day", "night"))
     variants = {"dark": dark, "narrow": narrow, "narrow-dark": narrow_dark}
     return Picture(f"Where {result.robot.name} can move as {operator} does", png, variants=variants)
 
 
 def _other_pages(shown: Sequence[Track], frame: int, names: Sequence[str]) -> dict[str, bytes]:
     """The bodies side by side for dark pages, and, with letters that can be read there, for phones."""
-    wide = png_bytes(draw(shown, frame, labels=names, dark=True))
+    wide = png_bytes(draw(shown, frame, labels=names, ground="night"))
+    short = [name.partition("(")[2].rstrip(")") or name for name in names]  # "pepper (simulated)" has no room
     narrow, narrow_dark = (
-        png_bytes(draw(shown, frame, size=(700, 560), labels=names, dark=dark)) for dark in (False, True)
+        png_bytes(draw(shown, frame, size=(700, 560), labels=short, ground=ground, letters=25))
+        for ground in ("day", "night")
     )
     return {"dark": wide, "narrow": narrow, "narrow-dark": narrow_dark}
 
@@ -285,7 +292,12 @@ def _film(tracks: Sequence[Track], names: Sequence[str], title: str, tell: Calla
     count = min(len(tracks[0]), _FILM_FRAMES)
     for frame in range(count):
         tell(frame / count)
-        yield draw(tracks, frame, labels=names, title=title, size=(768, 432), finer=1)
+        yield _still(tracks, names, title, frame, finer=1)
+
+
+def _still(tracks: Sequence[Track], names: Sequence[str], title: str, frame: int, finer: int = 2) -> Any:
+    """A picture of the film, on a ground that stands on light pages and on dark ones."""
+    return draw(tracks, frame, labels=names, title=title, size=(768, 432), finer=finer, ground="dusk")
 
 
 def _mean(chain: ChainResult, name: str) -> float:

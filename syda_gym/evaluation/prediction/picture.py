@@ -9,14 +9,18 @@ import numpy as np
 
 from syda_gym.errors import OptionError, nearest_name
 from syda_gym.evaluation.prediction.results import PredictionStudy
+from syda_gym.look import OPERATOR, ROBOT, plot_theme
 
 __all__ = ["prediction_png"]
 
-_COLORS = ("#1f4e79", "#4a90c2", "#b8d4e8", "#d9d9d9")
+_COLORS = (OPERATOR, ROBOT, "#8fb0ea", "#b9c2cd")  # of one hop and more; to be told from white and from black
 
 
 def prediction_png(
-    study: PredictionStudy, predictors: Sequence[str] = ("T", "hops", "training_error", "measured"), width: float = 13.0
+    study: PredictionStudy,
+    predictors: Sequence[str] = ("T", "hops", "training_error", "measured"),
+    width: float = 13.0,
+    ground: str = "day",
 ) -> bytes:
     """Scatters the held-out error of every route over the rank of its prediction, one panel a predictor.
 
@@ -24,6 +28,7 @@ def prediction_png(
         study: from ``validate``.
         predictors: which ones.
         width: inches, at 100 dots per inch.
+        ground: ``"day"`` for light pages, ``"night"`` for dark ones, ``"dusk"`` for both (see ``look.plot_theme``).
 
     Returns:
         PNG bytes.
@@ -31,6 +36,13 @@ def prediction_png(
     Raises:
         OptionError: unknown predictor.
     """
+    import matplotlib
+
+    with matplotlib.rc_context(plot_theme(ground)):
+        return _drawn(study, predictors, width)
+
+
+def _drawn(study: PredictionStudy, predictors: Sequence[str], width: float) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from scipy.stats import rankdata
@@ -41,7 +53,7 @@ def prediction_png(
             raise OptionError(f"the study has no predictor {name!r}; {nearest_name(name, scores)}")
     error = np.array([route.error for route in study.routes])
     hops = np.array([route.hops for route in study.routes])
-    figure = Figure(figsize=(width, 0.34 * width), dpi=100, facecolor="white", layout="constrained")
+    figure = Figure(figsize=(width, 0.34 * width), dpi=100, layout="constrained")
     panels = figure.subplots(1, len(predictors), sharey=True, squeeze=False)[0]
     for axis, name in zip(panels, predictors, strict=True):
         rank = rankdata([-route.predicted[name] for route in study.routes]) / len(study.routes)

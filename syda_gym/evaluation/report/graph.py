@@ -29,11 +29,9 @@ def graph_svg(graph: RouteGraph, *, narrow: bool = False) -> str:
     node = _NODE if len(places) <= 10 else max(12.0, 300.0 / len(places))
     ordered = sorted(graph.edges, key=lambda edge: (edge.source, edge.target) in chosen)
     labels = len(ordered) <= _MOST_LABELS
-    parts = [
-        _edge(edge, places, node, (edge.source, edge.target) in chosen, labels, name) for edge in ordered
-    ] + [
-        _node(body, kind, *places[body], node, body in graph.chosen) for body, kind in graph.bodies.items()
-    ]  # fmt: skip
+    edges = [_edge(edge, places, node, (edge.source, edge.target) in chosen, labels, name) for edge in ordered]
+    nodes = [_node(body, kind, *places[body], node, body in graph.chosen) for body, kind in graph.bodies.items()]
+    parts = [*(arrow for arrow, _ in edges), *nodes, *(label for _, label in edges)]  # no label below a node
     heads = "".join(
         f'<marker id="{head}{name}" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="{wide}" markerHeight="{wide}" '
         f'markerUnits="userSpaceOnUse" orient="auto"><path d="M0 1L10 5L0 9z" fill="{colour}"/></marker>'
@@ -60,7 +58,8 @@ def _places(graph: RouteGraph, width: float, height: float) -> dict[str, tuple[f
 
 def _edge(
     edge: RouteEdge, places: dict[str, tuple[float, float]], node: float, chosen: bool, label: bool, suffix: str
-) -> str:
+) -> tuple[str, str]:
+    """The arrow, and its label."""
     (x0, y0), (x1, y1) = places[edge.source], places[edge.target]
     length = math.hypot(x1 - x0, y1 - y0) or 1.0
     ux, uy = (x1 - x0) / length, (y1 - y0) / length
@@ -73,19 +72,36 @@ def _edge(
     words = f"{edge.source} to {edge.target}: T = {edge.transferability:.3f}{error}"
     text = ""
     if label:
-        # A point on the curve near its start, where arrows of other pairs do not cross.
-        t = 0.36
-        lx = (1 - t) ** 2 * start[0] + 2 * t * (1 - t) * cx + t**2 * end[0]
-        ly = (1 - t) ** 2 * start[1] + 2 * t * (1 - t) * cy + t**2 * end[1]
+        lx, ly = _label_place(start, (cx, cy), end, list(places.values()), node + 14)
         text = (
             f'<text x="{lx:.1f}" y="{ly + 4:.1f}" text-anchor="middle" class="edge-label">'
             f"{edge.transferability:.2f}</text>"
         )
-    return (
+    arrow = (
         f'<g><path d="M{start[0]:.1f} {start[1]:.1f}Q{cx:.1f} {cy:.1f} {end[0]:.1f} {end[1]:.1f}" fill="none" '
         f'stroke="{colour}" stroke-width="{width:.2f}" opacity="{0.95 if chosen else 0.5}" '
-        f'marker-end="url(#{head}{suffix})"><title>{escape(words)}</title></path>{text}</g>'
+        f'marker-end="url(#{head}{suffix})"><title>{escape(words)}</title></path></g>'
     )
+    return arrow, text
+
+
+def _label_place(
+    start: tuple[float, float],
+    control: tuple[float, float],
+    end: tuple[float, float],
+    nodes: list[tuple[float, float]],
+    clear: float,
+) -> tuple[float, float]:
+    """A point on the curve, near its start, where arrows of other pairs do not cross, and beside all nodes."""
+    found = []
+    for t in (0.36, 0.5, 0.26, 0.62, 0.74, 0.16, 0.84):
+        x, y = ((1 - t) ** 2 * start[axis] + 2 * t * (1 - t) * control[axis] + t**2 * end[axis] for axis in (0, 1))
+        room = min(math.hypot(x - a, y - b) for a, b in nodes)
+        if room >= clear:
+            return x, y
+        found.append((room, x, y))
+    _, x, y = max(found)
+    return x, y
 
 
 def _towards(point: tuple[float, float], other: tuple[float, float], distance: float) -> tuple[float, float]:

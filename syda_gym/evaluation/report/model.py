@@ -194,7 +194,7 @@ class Picture:
         kind: media type such as ``image/png`` or ``video/mp4``.
         note: text below.
         variants: the same picture for other pages, of the same kind: ``"dark"``, ``"narrow"`` (a phone) and
-            ``"narrow-dark"``.
+            ``"narrow-dark"``. A film has one, ``"poster"``: the PNG that is shown before it plays.
     """
 
     title: str

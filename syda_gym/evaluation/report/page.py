@@ -33,6 +33,7 @@ from syda_gym.files import write_text
 __all__ = ["report_html", "write_report"]
 
 _ASSETS = Path(__file__).parent / "assets"
+_MANY_COLUMNS = 8  # from more a table is set closer and may be wider than the text
 _FILTER_FROM = 12  # tables with at least so many rows get a search box
 
 
@@ -123,7 +124,9 @@ def _for_both(wide: str, narrow: str) -> str:
 def _picture(picture: Picture) -> str:
     source = _data(picture.kind, picture.data)
     if picture.kind.startswith("video/"):
-        return f'<video controls loop muted playsinline src="{source}"></video>'
+        poster = picture.variants.get("poster")
+        first = f' poster="{_data("image/png", poster)}"' if poster else ""
+        return f'<video controls loop muted playsinline preload="metadata"{first} src="{source}"></video>'
     if not picture.variants:
         return _img(picture, picture.data, "")
     light = _one_theme(picture, picture.data, picture.variants.get("narrow"), "on-light")
@@ -154,7 +157,7 @@ def _table(table: Table) -> str:
     strong = set(table.strong)
     rows = "".join(
         f"<tr{' class=strong' if index in strong else ''}>"
-        + "".join(_cell(cell, column) for cell, column in zip(row, table.columns, strict=True))
+        + "".join(_labelled(_cell(cell, column), column) for cell, column in zip(row, table.columns, strict=True))
         + "</tr>"
         for index, row in enumerate(table.rows)
     )
@@ -164,8 +167,9 @@ def _table(table: Table) -> str:
         else ""
     )
     note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
+    dense = " dense" if len(table.columns) > _MANY_COLUMNS else ""
     return (
-        f'<figure class="table"><figcaption>{escape(table.title)}</figcaption>{search}<div class="scroll tall">'
+        f'<figure class="table{dense}"><figcaption>{escape(table.title)}</figcaption>{search}<div class="scroll tall">'
         f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>{note}</figure>"
     )
 
@@ -175,6 +179,12 @@ def _head(column: Column, numeric: bool) -> str:
     unit = f' <span class="unit">[{escape(column.unit)}]</span>' if column.unit else ""
     tip = f' title="{escape(column.tip, quote=True)}"' if column.tip else ""
     return f'<th scope="col"{style}{tip}><button type="button">{escape(column.title)}{unit}</button></th>'
+
+
+def _labelled(cell: str, column: Column) -> str:
+    """The cell with its column's name: on a phone rows are cards, and each cell a line of one."""
+    unit = f" [{column.unit}]" if column.unit else ""
+    return cell.replace("<td", f'<td data-label="{escape(column.title + unit, quote=True)}"', 1)
 
 
 def _cell(cell: Cell, column: Column) -> str:

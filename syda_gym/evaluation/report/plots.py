@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 from html import escape
 
 from syda_gym.evaluation.report.model import BarPlot, CurvePlot
@@ -15,6 +17,8 @@ COLOURS = 8
 """Number of series colours in the style sheet (Okabe and Ito's palette, told apart by the colour-blind)."""
 
 _MOST_BARS = 40
+_MOST_NARROW_BARS = 20  # on a phone; more stand in two rows, one below the other
+_LETTER = 7.4  # pixels that a letter takes
 _STANDALONE_STYLE = """
 svg { --ink: #1c2430; --soft: #5b6675; --line: #d5dbe3; background: #fff;
   --s0: #0072b2; --s1: #e69f00; --s2: #009e73; --s3: #cc79a7; --s4: #56b4e9; --s5: #d55e00; --s6: #8f8a00; --s7:
@@ -33,6 +37,9 @@ def bar_svg(plot: BarPlot, *, narrow: bool = False) -> str:
     """
     if len(plot.groups) * len(plot.series) > _MOST_BARS or len(plot.series) > COLOURS:
         return _rows(plot, narrow)
+    if narrow and len(plot.groups) * len(plot.series) > _MOST_NARROW_BARS and len(plot.groups) > 3:
+        half = (len(plot.groups) + 1) // 2
+        return "".join(_bars(_part(plot, part), narrow, plot) for part in (slice(0, half), slice(half, None)))
     return _bars(plot, narrow)
 
 
@@ -80,21 +87,46 @@ def standalone(svg: str) -> str:
     return f'<?xml version="1.0"?>\n{head}><style>{_STANDALONE_STYLE}</style>{tail}\n'
 
 
-def _bars(plot: BarPlot, narrow: bool) -> str:
+def _part(plot: BarPlot, part: slice) -> BarPlot:
+    """Some of the groups."""
+    series = {name: list(estimates)[part] for name, estimates in plot.series.items()}
+    return replace(plot, groups=list(plot.groups)[part], series=series)
+
+
+def _wrapped(groups: Sequence[str], room: float) -> list[list[str]] | None:
+    """Names in lines that fit below their bars; ``None`` if a word does not, or three lines are not enough."""
+    letters = max(1, int(room / _LETTER))
+    lines = [textwrap.wrap(group, letters, break_long_words=False, break_on_hyphens=False) for group in groups]
+    fits = all(len(line) <= letters for rows in lines for line in rows) and max(len(rows) for rows in lines) <= 3
+    return lines if fits else None
+
+
+def _bars(plot: BarPlot, narrow: bool, whole: BarPlot | None = None) -> str:
+    """Bars in groups.
+
+    Args:
+        plot: what to draw.
+        narrow: for a phone.
+        whole: of which ``plot`` is a part, for one scale in all of them.
+    """
     room = _width(narrow) - _left(narrow) - 12
-    slanted = max(len(group) for group in plot.groups) * 7.4 > room / len(plot.groups)
-    canvas = _Canvas(
-        _width(narrow), 360 if slanted else 320, left=_left(narrow), right=12, top=24, bottom=88 if slanted else 36
-    )
+    names = _wrapped(plot.groups, 0.94 * room / len(plot.groups))
+    # Slanted names go to the left, beyond the edge of a phone if they are long.
+    below = 20 + 16 * max(len(rows) for rows in names) if names else 88
+    canvas = _Canvas(_width(narrow), 284 + below, left=_left(narrow), right=12, top=24, bottom=below)
     if len(plot.series) > 1 or next(iter(plot.series)):
         canvas.make_room_for(list(plot.series))
-    values = [v * plot.scale for es in plot.series.values() for e in es for v in (e.value, e.high)]
+    series = (whole or plot).series.values()
+    values = [v * plot.scale for es in series for e in es for v in (e.value, e.high)]
     canvas.y_axis([0.0, *values], plot.label)
     group_width = canvas.inner_width / len(plot.groups)
     bar_width = min(46.0, 0.78 * group_width / len(plot.series))
     for g, group in enumerate(plot.groups):
         middle = canvas.left + (g + 0.5) * group_width
-        canvas.text(middle, canvas.bottom + (14 if slanted else 21), group, anchor="middle", slanted=slanted)
+        for row, words in enumerate(names[g] if names else [group]):
+            canvas.text(
+                middle, canvas.bottom + (21 + 16 * row if names else 14), words, anchor="middle", slanted=names is None
+            )
         for s, (name, estimates) in enumerate(plot.series.items()):
             x = middle + (s - len(plot.series) / 2) * bar_width
             _bar(canvas, x, bar_width, estimates[g], plot.scale, s, f"{name}, {group}")
@@ -166,7 +198,7 @@ def _width(narrow: bool) -> float:
 
 
 def _left(narrow: bool) -> float:
-    return 52.0 if narrow else 64.0
+    return 60.0 if narrow else 64.0
 
 
 class _Canvas:

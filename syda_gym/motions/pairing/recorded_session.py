@@ -13,13 +13,14 @@ import numpy as np
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.errors import MotionError, nearest_name
 from syda_gym.motions.clip import MotionClip, Motions
-from syda_gym.motions.loading import load_motions
+from syda_gym.motions.how_to_read import AS_IT_STANDS, HowToRead
+from syda_gym.motions.loading import FORMATS
 from syda_gym.motions.pairing.alignment import ActionQuality, Alignment, pair_quality, pair_recordings
 
 __all__ = ["Session", "operator_clips", "pair_session"]
 
 _REPEAT = r"(-?(take|trial|rep|repeat|run|no|t|r|v)?-?\d+)?"
-_SUFFIXES = (".csv", ".txt", ".skeleton", ".bvh", ".json", ".jsonl", ".npz")
+_ENDINGS = tuple(dict.fromkeys(ending for entry in FORMATS.values() for ending in entry.endings))
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +40,9 @@ class Session:
     left_out: dict[str, str]
 
 
-def operator_clips(source: str | os.PathLike[str] | Motions, *, name: str = "operator") -> tuple[MotionClip, ...]:
+def operator_clips(
+    source: str | os.PathLike[str] | Motions, *, name: str = "operator", how: HowToRead = AS_IT_STANDS
+) -> tuple[MotionClip, ...]:
     """Reads the recordings of one operator as clips of one body.
 
     The files of a folder give slightly different link lengths; the body gets their medians, frames stay as recorded.
@@ -47,11 +50,13 @@ def operator_clips(source: str | os.PathLike[str] | Motions, *, name: str = "ope
     Args:
         source: a folder of recordings in any known formats, one file, or motions with one human.
         name: what to call the operator.
+        how: what a person says about the files; it holds for every one of them.
 
     Raises:
         MotionError: no recordings, recordings of several humans, or of different arms.
+        OptionError: something is said that does not fit.
     """
-    clips = [clip for motions in _sources(source) for clip in _only_human(motions)]
+    clips = [clip for motions in _sources(source, how) for clip in _only_human(motions)]
     humans = [clip.body for clip in clips if isinstance(clip.body, HumanSkeleton)]
     first = humans[0]
     for human, clip in zip(humans, clips, strict=True):
@@ -125,16 +130,16 @@ def pair_session(
     return Session(motions, alignments, pair_quality(motions.pair(human.name, robot.name), max_lag=max_lag), left_out)
 
 
-def _sources(source: str | os.PathLike[str] | Motions) -> list[Motions]:
+def _sources(source: str | os.PathLike[str] | Motions, how: HowToRead) -> list[Motions]:
     if isinstance(source, Motions):
-        return [source]
+        return [how.load(source)]
     path = Path(source)
     if not path.is_dir() or (path / "dataset.json").is_file():
-        return [load_motions(source)]
-    files = sorted(file for file in path.iterdir() if file.suffix.lower() in _SUFFIXES)
+        return [how.load(source)]
+    files = sorted(file for file in path.iterdir() if file.suffix.lower() in _ENDINGS)
     if not files:
-        raise MotionError(f"{path} holds no recordings; expected files that end with {', '.join(_SUFFIXES)}")
-    return [load_motions(file) for file in files]
+        raise MotionError(f"{path} holds no recordings; expected files that end with {', '.join(_ENDINGS)}")
+    return [how.load(file) for file in files]
 
 
 def _only_human(motions: Motions) -> tuple[MotionClip, ...]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +22,8 @@ _LEAST_TRACKED = 0.3
 _COARSE = 0.3  # share of frames that repeat a stamp from which stamps are coarser than frames
 _SLOWEST, _FASTEST = 0.1, 1_500.0  # frames per second
 _ASSUMED = 30.0
+_HELD = 0.15  # s in which a joint is bit for bit in one place, from which that is said
+_SIGNS = 2  # different values by which a tool may say that a joint was lost
 
 
 class Clock:
@@ -48,6 +53,7 @@ def frame_clock(recording: Recording, said: Said) -> Clock:
     if count > MAX_FRAMES:
         raise MotionError(f"{recording.path}: {count} frames; at most {MAX_FRAMES} are read. Cut it into pieces")
     every = np.arange(count)
+    _in_order(recording)
     if recording.stamps is not None:
         times, doubt = seconds(recording.stamps)
         if times is None:
@@ -59,6 +65,34 @@ def frame_clock(recording: Recording, said: Said) -> Clock:
             recording.doubt(doubt)
         return _stamped(recording, times)
     return Clock(every / (recording.fps or said.fps or _ASSUMED), every, False)
+
+
+def _in_order(recording: Recording) -> None:
+    """Sorts frames that stand in another order than their times, as threads write them.
+
+    Several recordings in one file, whose times run backward too, are left as they are: sorted they would jump to and
+    fro between one and the other.
+    """
+    if recording.stamps is None:
+        return
+    values = np.asarray(recording.stamps.values, dtype=np.float64)
+    if not np.isfinite(values).all() or not (np.diff(values) < 0).any() or len(np.unique(values)) < len(values):
+        return
+    order = np.argsort(values, kind="stable")
+    sorted_joints = {name: positions[order] for name, positions in recording.joints.items()}
+    if _path(sorted_joints) > _path(recording.joints):
+        return
+    moved = int((order != np.arange(len(order))).sum())
+    recording.joints = sorted_joints
+    recording.stamps = replace(recording.stamps, values=values[order])
+    if recording.lines is not None:
+        recording.lines = recording.lines[order]
+    recording.doubt(f"{moved} frames are not in the order of their {recording.stamps.name}; they were sorted by it")
+
+
+def _path(joints: Mapping[str, FloatArray]) -> float:
+    """How far all joints move from frame to frame, added up."""
+    return float(sum(np.nansum(np.linalg.norm(np.diff(positions, axis=0), axis=1)) for positions in joints.values()))
 
 
 def frame_rate(recording: Recording, clock: Clock, said: Said) -> float:
@@ -161,7 +195,7 @@ def filled(
     """
     joints: dict[str, FloatArray] = {}
     gaps: dict[str, NDArray[np.bool_]] = {}
-    for name, raw in recording.joints.items():
+    for name, raw in _without_placeholders(recording).items():
         values = raw[clock.keep]
         if np.isinf(values).any():
             frame = int(clock.keep[np.flatnonzero(np.isinf(values).any(axis=1))[0]])
@@ -180,9 +214,51 @@ def filled(
                     f"{first}); at least {100 * _LEAST_TRACKED:.0f} % are needed"
                 )
             continue
+        if name in needed and not name.endswith("Shoulder"):
+            _say_held(recording, name, values, recording.joints[name[0] + "Shoulder"][clock.keep], clock.times)
         gaps[name] = lost
         joints[name] = _interpolated(recording, name, values, lost, clock.times, name in needed)
     return joints, gaps
+
+
+def _say_held(recording: Recording, name: str, values: FloatArray, shoulder: FloatArray, times: FloatArray) -> None:
+    """Says that a tool held a joint that it had lost: bit for bit in one place, while its shoulder moves."""
+    still, resting = ((points[1:] == points[:-1]).all(axis=1) for points in (values, shoulder))
+    held = np.r_[False, still & ~resting]
+    if not held.any():
+        return
+    longest = _longest(held, times)
+    if longest < _HELD:
+        return
+    text = (
+        f"{name} does not move at all for {longest:.2f} s though its shoulder does: it seems to have been lost and "
+        "held in place"
+    )
+    recording.doubt(text) if longest > 1.0 else recording.notes.append(text)
+
+
+def _without_placeholders(recording: Recording) -> Mapping[str, FloatArray]:
+    """Positions without those that stand for a lost joint: zeros, -1 or -9999 in all three coordinates.
+
+    Nobody's joint has three equal coordinates again and again; where it has in every frame, it is the origin.
+    """
+    equal = {
+        name: (values[:, 0] == values[:, 1]) & (values[:, 1] == values[:, 2])
+        for name, values in recording.joints.items()
+    }
+    equal = {name: rows for name, rows in equal.items() if rows.any() and not rows.all()}
+    signs = {float(value) for name, rows in equal.items() for value in np.unique(recording.joints[name][rows, 0])}
+    if not signs or len(signs) > _SIGNS:
+        return recording.joints
+    count = sum(int(rows.sum()) for rows in equal.values())
+    recording.notes.append(
+        f"x = y = z = {', '.join(f'{sign:g}' for sign in sorted(signs))} in {count} places ({', '.join(equal)}): no "
+        "place, but a sign that the joint was lost; taken as gaps"
+    )
+    return {
+        name: np.where(equal[name][:, None], np.nan, values) if name in equal else values
+        for name, values in recording.joints.items()
+    }
 
 
 def _interpolated(

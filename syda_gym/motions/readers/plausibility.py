@@ -14,7 +14,10 @@ import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
 
-__all__ = ["Finding", "bends_backward", "examine"]
+__all__ = ["DOUBTFUL", "Finding", "bends_backward", "examine"]
+
+DOUBTFUL = 1.0
+"""Weight of a finding from which it is said aloud."""
 
 _LIMBS = (
     ("Shoulder", "Elbow", "upper arm"),

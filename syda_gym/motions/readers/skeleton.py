@@ -20,7 +20,7 @@ from syda_gym.errors import EmbodimentError, MotionError
 from syda_gym.motions.clip import Motions, Take
 from syda_gym.motions.readers.gaps import filled, frame_clock, frame_rate
 from syda_gym.motions.readers.joint_names import missing_hint
-from syda_gym.motions.readers.plausibility import bends_backward, examine
+from syda_gym.motions.readers.plausibility import DOUBTFUL, bends_backward, examine
 from syda_gym.motions.readers.recording import MotionWarning, Recording, say
 from syda_gym.motions.readers.said import NOTHING_SAID, Said
 
@@ -41,7 +41,6 @@ _UNKNOWN_ARM = 0.58  # m; an adult's arm, for files in units of their own
 _HEADING_SECONDS = 0.5
 _STATURE_PER_ARM = 1.0 / 0.332
 _NO_PERSON = 3.5  # weight of what is odd about the arms from which a file is refused
-_DOUBTFUL = 1.0  # weight from which it is said aloud
 
 
 def motions_from(recording: Recording, said: Said = NOTHING_SAID, body: str = "operator") -> Motions:
@@ -136,7 +135,7 @@ def _check_person(recording: Recording, joints: Mapping[str, FloatArray], told: 
             "meant? Say which is which: --joints LShoulder=..., LElbow=..., LHand=..."
         )
     for finding in findings:
-        if finding.weight >= _DOUBTFUL:
+        if finding.weight >= DOUBTFUL:
             recording.doubt(f"odd for a person: {finding.text}")
         else:
             recording.notes.append(f"odd for a person: {finding.text}")
@@ -309,7 +308,9 @@ def _human(
             name, height=stature, upper_arm=float(links[0]), forearm=float(links[1]), shoulders=shoulders, sides=sides
         )
     except EmbodimentError as error:
-        raise MotionError(f"{path}: the joints make no human: {error}") from error
+        raise MotionError(
+            f"{path}: the joints make no human: {error}. --unit says what the file's numbers are"
+        ) from error
 
 
 def _middle(

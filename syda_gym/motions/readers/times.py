@@ -8,13 +8,15 @@ second, less often at 60, 25, 100 or 120, hardly ever at 3 or 300. A date (secon
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
 
-__all__ = ["CLOCKS", "UNITS", "Stamps", "clock_unit", "seconds"]
+__all__ = ["CLOCKS", "UNITS", "Stamps", "clock_unit", "past_midnight", "seconds", "timecodes"]
 
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ticks": 1e-7, "ns": 1e-9}
 """Units of time, in seconds."""
@@ -26,7 +28,7 @@ CLOCKS: dict[str, str | None] = {
     "millisecond": "ms", "milliseconds": "ms", "us": "us", "usec": "us", "micros": "us", "microseconds": "us",
     "ns": "ns",
     "nsec": "ns", "nanoseconds": "ns", "ticks": "ticks", "zeit": None, "temps": None,
-    "tiempo": None, "tempo": None,
+    "tiempo": None, "tempo": None, "timecode": None, "smpte": None, "tc": None,
 }  # fmt: skip
 """How columns of time are called, with the unit where the name says it."""
 
@@ -42,6 +44,9 @@ _USUAL = {30.0: 1.2, 60.0: 1.0, 25.0: 0.7, 24.0: 0.5, 15.0: 0.7, 50.0: 0.6, 100.
 20.0: 0.4,
           12.0: 0.1, 90.0: 0.3, 200.0: 0.2, 240.0: 0.3, 125.0: 0.1, 150.0: 0.1}  # fmt: skip
 _SLOWEST, _FASTEST = 0.1, 1_500.0
+_DAY = 86_400.0  # s
+_TIMECODE = re.compile(r"(\d{1,2}):(\d{2}):(\d{2})[:;.,](\d{1,3})$")
+_FILM_RATES = (24, 25, 30, 48, 50, 60, 100, 120, 240)  # frames that a second of a timecode may have
 _SURE = 0.9  # how much likelier the best unit must be than the next
 _DATES = (  # what a date between 2000 and 2100 is in seconds: since 1970, 1601 and year 1
     (9.46e8, 4.11e9), (1.259e10, 1.575e10), (6.308e10, 6.624e10),
@@ -121,6 +126,30 @@ def seconds(stamps: Stamps) -> tuple[FloatArray | None, str | None]:
     start = float(known[0])
     result: FloatArray = (values - start) * UNITS[unit] + start * UNITS[unit]
     return result, doubt
+
+
+def past_midnight(values: FloatArray) -> FloatArray:
+    """Times of day [s] that go on growing where a new day begins."""
+    steps = np.diff(values, prepend=values[:1])
+    result: FloatArray = values + _DAY * np.cumsum(np.nan_to_num(steps) < -0.5 * _DAY)
+    return result
+
+
+def timecodes(cells: Sequence[str]) -> FloatArray | None:
+    """Seconds of ``hours:minutes:seconds:frames``; ``None`` if a cell is something else.
+
+    How many frames a second has is told by the highest number before a second ends; where no second ends within the
+    recording, nothing tells it.
+    """
+    found = [_TIMECODE.match(cell) for cell in cells]
+    if not found or not all(found):
+        return None
+    hours, minutes, whole, frames = np.array([match.groups() for match in found if match], dtype=np.float64).T
+    times = 3600.0 * hours + 60.0 * minutes + whole
+    if len(np.unique(times)) < 2:
+        return None
+    rate = next((rate for rate in _FILM_RATES if rate > frames.max()), float(frames.max()) + 1.0)
+    return past_midnight(times + frames / rate)
 
 
 def _counts(known: FloatArray, steps: FloatArray) -> bool:

@@ -14,16 +14,7 @@ from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, nearest_name
-from syda_gym.look import (
-    LIGHT_AMBIENT,
-    LIGHT_DIFFUSE,
-    LIGHT_FROM,
-    LIGHT_SPECULAR,
-    REFERENCE,
-    SKY_BOTTOM,
-    SKY_TOP,
-    rgba,
-)
+from syda_gym.look import GROUNDS, LIGHT_AMBIENT, LIGHT_DIFFUSE, LIGHT_FROM, LIGHT_SPECULAR, REFERENCE, rgba
 from syda_gym.simulation.landmark_kinematics import LandmarkKinematics
 from syda_gym.simulation.pictures.frustum import Frustum, PictureWindow
 from syda_gym.simulation.pictures.scene import Marker, PosedRobot, PosedSkeleton, floor_below
@@ -56,6 +47,7 @@ class CameraView:
         error: show the landmark errors as colours of elbows and wrists, green (none) to red (``error_scale``).
         error_scale: landmark error that is fully red [m].
         appearance: a URDF with the same joint names to show instead, for example the vendor's with meshes.
+        ground: what they stand on and before: ``day``, ``night`` for dark pages, or ``dusk`` for both.
 
     Raises:
         OptionError: a value outside what is allowed.
@@ -72,8 +64,11 @@ class CameraView:
     error: bool = True
     error_scale: float = 0.15
     appearance: str | os.PathLike[str] | None = None
+    ground: str = "day"
 
     def __post_init__(self) -> None:
+        if self.ground not in GROUNDS:
+            raise OptionError(f"camera ground={self.ground!r} is unknown; {nearest_name(str(self.ground), GROUNDS)}")
         for name, low, high in (
             ("width", 16, 4096), ("height", 16, 4096), ("distance", 0.2, 50.0), ("yaw", -360.0, 360.0),
             ("pitch", -89.0, 89.0), ("fov", 5.0, 120.0), ("error_scale", 1e-4, 10.0),
@@ -215,7 +210,8 @@ class Camera:
         still = PosedRobot(self._robot, client, urdf=self.view.appearance)
         still.hide(still.moving)
         puppet.remove()
-        floor_below(client, self._floor)
+        ground = GROUNDS[self.view.ground]
+        floor_below(client, self._floor, ground.floor)
         self._add_operator(client, moving=False)
         shot, far = self._shoot(client, self._frustum.whole)
         image, depth = shot.copy(), far.copy()
@@ -223,7 +219,7 @@ class Camera:
         self._clients.remove(client)
         sky = depth >= 1.0
         shade = np.linspace(0.0, 1.0, self.view.height)[:, None, None]
-        gradient = 255.0 * ((1.0 - shade) * np.array(SKY_TOP) + shade * np.array(SKY_BOTTOM))
+        gradient = 255.0 * ((1.0 - shade) * np.array(ground.sky_top) + shade * np.array(ground.sky_bottom))
         image[sky] = np.broadcast_to(gradient, image.shape)[sky].astype(np.uint8)
         return image, depth
 

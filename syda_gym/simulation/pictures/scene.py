@@ -223,12 +223,12 @@ class Marker:
         )
 
 
-def floor_below(client: int, height: float) -> None:
-    """A light floor whose surface is at ``height`` [m]."""
+def floor_below(client: int, height: float, colour: tuple[float, float, float] = GROUND) -> None:
+    """A floor whose surface is at ``height`` [m]."""
     import pybullet
 
     shape = pybullet.createVisualShape(
-        pybullet.GEOM_BOX, halfExtents=(20.0, 20.0, 0.01), rgbaColor=(*GROUND, 1.0), physicsClientId=client
+        pybullet.GEOM_BOX, halfExtents=(20.0, 20.0, 0.01), rgbaColor=(*colour, 1.0), physicsClientId=client
     )
     pybullet.createMultiBody(0.0, -1, shape, (0.0, 0.0, height - 0.01), physicsClientId=client)
 

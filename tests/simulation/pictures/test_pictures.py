@@ -52,6 +52,25 @@ def test_a_picture_has_its_size_and_shows_motion_of_robot_ghost_and_operator(cam
     assert not waved[:, :80].any(), "the robot's half must not change"
 
 
+@pytest.mark.parametrize(("ground", "low", "high"), [("night", 0, 75), ("dusk", 70, 150)])
+def test_grounds_for_dark_pages_and_for_both_change_what_is_behind_alone(camera, ground, low, high):
+    day = camera.picture(PEPPER.rest, operator=ADULT.standing())
+    with Camera(PEPPER, ADULT, CameraView(**SMALL, ground=ground)) as other:
+        picture = other.picture(PEPPER.rest, operator=ADULT.standing())
+    corners = np.array([picture[row, column] for row in (0, -1) for column in (0, -1)]).mean(axis=1)
+    assert (corners >= low).all()
+    assert (corners < high).all()
+    robot = (slice(35, 60), slice(54, 60))  # chest and head of Pepper
+    assert not differ(day[robot], picture[robot]).all()
+    assert differ(day, picture).mean() > 0.6
+    assert day[:5].mean() > 200
+
+
+def test_an_unknown_ground_is_refused():
+    with pytest.raises(OptionError, match="ground='dask' is unknown; did you mean 'dusk'"):
+        CameraView(ground="dask")
+
+
 def test_the_same_pose_gives_the_same_picture(camera):
     first = camera.picture(raised(), reference=PEPPER.rest, operator=ADULT.standing(), errors=np.full(4, 0.1))
     camera.picture(PEPPER.rest, operator=ADULT.standing())

@@ -76,8 +76,16 @@ def landmark_recording(file: Path, data: bytes, said: Said, format: str | None =
     if not frames:
         raise MotionError(f"{file} has no frames")
     if len(frames) == 1 and isinstance(frames[0], Mapping) and "people" in frames[0]:
+        people = frames[0]["people"]
+        deep = isinstance(people, list) and any(isinstance(p, Mapping) and p.get("pose_keypoints_3d") for p in people)
         raise MotionError(
-            f"{file} holds one frame, as OpenPose writes one file a frame; join them into a list of frames first"
+            f"{file} holds one frame, as OpenPose writes one file a frame"
+            + (
+                "; join them into a list of frames first"
+                if deep
+                else ", and places in a picture, whose depth is unknown. Use a tracker that gives positions in space, "
+                "or read the film itself: film:FILE"
+            )
         )
     named = about.get("joint_names")
     common = (

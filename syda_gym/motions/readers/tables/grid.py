@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
@@ -22,6 +22,7 @@ _MOST_HEADER = 60  # lines before the first frame
 _SPACES = re.compile(r"[ \t]+")
 _ENDS = {"END", "END,", "END;"}
 _CLOCK = re.compile(r"(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:\.\d+)?)$")
+_REMARKS = ("#", "%", "//")  # how lines begin that are remarks, wherever they stand
 _MOST_COLUMNS = 20_000
 
 
@@ -36,6 +37,7 @@ class Grid:
         words: column to its cells, for columns that hold words.
         lines: ``(N,)`` line of each row, from 1.
         bad: column to the first line whose cell is a word among numbers.
+        clocks: columns that hold times of day, which begin again at midnight.
     """
 
     path: Path
@@ -44,6 +46,7 @@ class Grid:
     words: dict[int, list[str]]
     lines: NDArray[np.int64]
     bad: dict[int, tuple[int, str]]
+    clocks: set[int] = field(default_factory=set)
 
     def check(self, columns: list[int]) -> None:
         """Refuses columns with words among their numbers.
@@ -76,7 +79,9 @@ def read_grid(path: Path, lines: list[str], said: Said) -> Grid:
             f"with {sample!r}"
         )
     header = [cells_of(line, separator) for line in lines[:first] if line.strip() and not said.skip_lines]
-    kept = [n for n in range(first, len(lines)) if lines[n].strip() and lines[n].strip().upper() not in _ENDS]
+    # A header that stands there again, where a tool was restarted.
+    again = {line.strip() for line in lines[:first] if any(letter.isalpha() for letter in line)}
+    kept = [n for n in range(first, len(lines)) if _is_frame(lines[n].strip(), again)]
     count = len(cells_of(lines[kept[0]], separator, decimal_comma))
     if count > _MOST_COLUMNS:
         raise MotionError(f"{path}: {count} columns; at most {_MOST_COLUMNS} are read")
@@ -84,6 +89,10 @@ def read_grid(path: Path, lines: list[str], said: Said) -> Grid:
     if fast is not None:
         return Grid(path, header, fast, {}, np.array(kept) + 1, {})
     return _slow(path, header, lines, kept, separator, decimal_comma, count)
+
+
+def _is_frame(line: str, header: set[str]) -> bool:
+    return bool(line) and line.upper() not in _ENDS and not line.startswith(_REMARKS) and line not in header
 
 
 def cells_of(line: str, separator: str | None, decimal_comma: bool = False) -> list[str]:
@@ -180,6 +189,7 @@ def _slow(
     values = np.full((len(kept), wanted), np.nan)
     words: dict[int, list[str]] = {}
     bad: dict[int, tuple[int, str]] = {}
+    clocks: set[int] = set()
     for index, number in enumerate(kept):
         row = cells_of(lines[number], separator, decimal_comma)
         if (
@@ -199,12 +209,14 @@ def _slow(
                 moment = _moment(cell)
                 if moment is not None:
                     values[index, column] = moment
+                    if ":" in cell[:3]:
+                        clocks.add(column)
                     continue
                 if column not in words:
                     words[column] = [""] * len(kept)
                 words[column][index] = cell
                 bad.setdefault(column, (number + 1, cell))
-    return Grid(path, header, values, words, np.array(kept) + 1, bad)
+    return Grid(path, header, values, words, np.array(kept) + 1, bad, clocks)
 
 
 def _padded(row: list[str], count: int, wanted: int, separator: str | None, header: list[list[str]]) -> bool:

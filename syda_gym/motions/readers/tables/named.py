@@ -18,7 +18,7 @@ from syda_gym.motions.readers.said import Said
 from syda_gym.motions.readers.tables.columns import Columns
 from syda_gym.motions.readers.tables.grid import Grid
 from syda_gym.motions.readers.tables.people import chosen, one_person
-from syda_gym.motions.readers.times import Stamps
+from syda_gym.motions.readers.times import Stamps, past_midnight, timecodes
 
 __all__ = ["from_header", "from_names", "points_by_person"]
 
@@ -172,8 +172,14 @@ def _stamps(grid: Grid, columns: Columns, said: Said) -> Stamps | None:
     if column < 0 or column >= grid.values.shape[1]:
         return None
     if column in grid.words:
+        codes = timecodes(grid.words[column])
+        if codes is not None:
+            return Stamps(codes, "s", name)
         grid.check([column])
-    return Stamps(grid.values[:, column], said.time_unit or unit, name)
+    values = grid.values[:, column]
+    if column in grid.clocks:
+        return Stamps(past_midnight(values), "s", name)
+    return Stamps(values, said.time_unit or unit, name)
 
 
 def _kind(names: Sequence[str], sure: bool) -> str:

@@ -100,6 +100,7 @@ def test_frame_rate_is_what_the_user_says(paper_dir: Path) -> None:
     assert load_motions(f"paper:{paper_dir}", fps=12.5).pair("adult", "kid").fps == 12.5
 
 
+@pytest.mark.filterwarnings("ignore::syda_gym.motions.readers.skeleton.MotionWarning")  # its joints lie anywhere
 def test_small_dataset_is_read_and_sniffed(small: Path) -> None:
     motions = load_motions(small)
     assert [take.mirrored for take in motions.takes] == [False, True] * 3
