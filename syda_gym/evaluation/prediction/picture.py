@@ -16,7 +16,7 @@ _COLORS = ("#1f4e79", "#4a90c2", "#b8d4e8", "#d9d9d9")
 
 
 def prediction_png(
-    study: PredictionStudy, predictors: Sequence[str] = ("T", "hops", "training_error", "measured"), width: float = 13.0
+    study: PredictionStudy, predictors: Sequence[str] = ("T", "hops", "dry_run", "measured"), width: float = 13.0
 ) -> bytes:
     """Scatters the held-out error of every route over the rank of its prediction, one panel a predictor.
 
