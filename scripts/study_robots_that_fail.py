@@ -11,9 +11,11 @@ adult's embedded synthetic motions are planned. Robots are Pepper, NAO, or names
 from __future__ import annotations
 
 import argparse
+import math
 from functools import reduce
 from operator import add
 from pathlib import Path
+from typing import Any
 
 from syda_gym.evaluation.prediction.bed import HUMANS, ROBOTS, TestBed, bed_bodies
 from syda_gym.evaluation.prediction.bed_study import study_bed
@@ -22,6 +24,15 @@ from syda_gym.files import write_json
 from syda_gym.motions.loading import load_motions
 from syda_gym.routes.dry_run.memory import default_plan
 from syda_gym.routes.dry_run.plan import Plan, plan_from_motions
+
+COLUMNS = {
+    "pairs": "pairs",
+    "chains": "chains",
+    "pairs_average": "pairs, average",
+    "chains_average": "chains, average",
+    "choice": "choice",
+    "regret": "regret [%]",
+}
 
 
 def planned(texts: list[str]) -> Plan:
@@ -58,14 +69,53 @@ def main() -> None:
         workers=arguments.workers,
         progress=lambda done, what: print(f"{100 * done:5.1f} %  {what}", flush=True),
     )
-    columns = ("pairs", "chains", "pairs_average", "chains_average", "choice", "regret")
-    print("| predictor |", " | ".join(columns), "|\n|---|" + "---|" * len(columns))
-    for predictor, scores in figures["scores"].items():
-        cells = [f"{one['value']:.2f} [{one['low']:.2f}, {one['high']:.2f}]" for one in map(scores.get, columns)]
-        print(f"| {predictor} |", " | ".join(cells), "|")
-    print("| ceiling |", " | ".join(f"{figures['ceiling'].get(one, float('nan')):.2f}" for one in columns), "|")
+    print(tables(figures))
     if arguments.json:
-        write_json(arguments.json, figures)
+        write_json(arguments.json, plain(figures))
+
+
+def tables(figures: dict[str, Any]) -> str:
+    """The page's tables in Markdown: everybody, those whom the paper's definition knows, and without any one body."""
+    known = figures["where_the_paper_knows_everybody"]
+    apart = figures["without_one_body"]
+    lines = [*scores_table(figures, "planned motion"), "", f"{', '.join(known['bodies'])}:", ""]
+    lines += [*scores_table(known, "planned motion"), "", "| without | pairs | chains | measured: pairs | chains |"]
+    lines.append("|---|---|---|---|---|")
+    for body in figures["bodies"]:
+        cells = [apart[name][body][part] for name in ("planned motion", "measured") for part in ("pairs", "chains")]
+        lines.append(f"| {body} | " + " | ".join(f"{cell:.2f}" for cell in cells) + " |")
+    return "\n".join(lines)
+
+
+def scores_table(figures: dict[str, Any], first: str) -> list[str]:
+    """Predictors as rows, the default first, with the ceiling below."""
+    lines = ["| predictor | " + " | ".join(COLUMNS.values()) + " |", "|---" * (len(COLUMNS) + 1) + "|"]
+    scores = figures["scores"]
+    for name in sorted(scores, key=lambda one: one != first):
+        cells = []
+        for column in COLUMNS:
+            scale, digits = (100.0, 1) if column == "regret" else (1.0, 2)
+            value, low, high = (scale * scores[name][column][end] for end in ("value", "low", "high"))
+            cells.append(f"{value:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]")
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    ceiling = figures["ceiling"]
+    values = [f"{ceiling[column]:.2f}" if column in ceiling else "" for column in COLUMNS]
+    lines.append("| ceiling | " + " | ".join(values) + " |")
+    lines.append(
+        "| reliability | "
+        + " | ".join(f"{ceiling[key]:.2f}" if (key := f"{column}_reliability") in ceiling else "" for column in COLUMNS)
+        + " |"
+    )
+    return lines
+
+
+def plain(value: Any) -> Any:
+    """JSON has no NaN: what could not be computed, as the choice among one chain, is null."""
+    if isinstance(value, dict):
+        return {name: plain(one) for name, one in value.items()}
+    if isinstance(value, list):
+        return [plain(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 if __name__ == "__main__":
