@@ -1,8 +1,8 @@
 """Builds what is known beforehand of the bundled bodies: sampled workspaces compared, and the default plan imitated.
 
 ``python scripts/build_transferability.py`` writes ``assets/transferability.json`` and ``assets/dry_run.npz`` (about a
-minute); with ``--check`` it computes again and says whether the assets still hold. Run it when a bundled body, the
-sampling, the embedded motions or the imitation has changed.
+minute); ``--only imitations`` makes the second alone, in seconds. With ``--check`` it computes again and says whether
+the assets still hold. Run it when a bundled body, the sampling, the embedded motions or the imitation has changed.
 """
 
 from __future__ import annotations
@@ -53,20 +53,40 @@ def main() -> int:
     """Command line; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="compare instead of writing")
-    check, made, shown = parser.parse_args().check, comparisons(), imitations()
-    if not check:
-        write_json(FILE, {"comparisons": made})
-        with atomic_path(memory.FILE) as path, path.open("wb") as file:
-            np.savez_compressed(file, allow_pickle=False, **shown)
-        print(f"{FILE}: {len(made)} comparisons, {FILE.stat().st_size} bytes")
-        print(f"{memory.FILE}: {len(shown)} imitations, {memory.FILE.stat().st_size} bytes")
-        return 0
-    stored = read_json(FILE)["comparisons"]
-    same = stored.keys() == made.keys() and all(np.allclose(made[key], stored[key], atol=TOLERANCE) for key in made)
-    with np.load(memory.FILE, allow_pickle=False) as known:
-        same &= set(known.files) == set(shown) and all(np.allclose(known[key], shown[key], atol=1e-6) for key in shown)
-    print("holds" if same else "differs: run scripts/build_transferability.py and commit the asset")
+    parser.add_argument("--only", choices=("comparisons", "imitations"), help="one of the two")
+    arguments = parser.parse_args()
+    same = True
+    if arguments.only != "imitations":
+        same &= _comparisons(arguments.check)
+    if arguments.only != "comparisons":
+        same &= _imitations(arguments.check)
+    if arguments.check:
+        print("holds" if same else "differs: run scripts/build_transferability.py and commit the asset")
     return 0 if same else 1
+
+
+def _comparisons(check: bool) -> bool:
+    """Writes them, or says whether those that are stored hold."""
+    made = comparisons()
+    if check:
+        stored = read_json(FILE)["comparisons"]
+        return stored.keys() == made.keys() and all(np.allclose(made[key], stored[key], atol=TOLERANCE) for key in made)
+    write_json(FILE, {"comparisons": made})
+    print(f"{FILE}: {len(made)} comparisons, {FILE.stat().st_size} bytes")
+    return True
+
+
+def _imitations(check: bool) -> bool:
+    shown = imitations()
+    if check:
+        with np.load(memory.FILE, allow_pickle=False) as known:
+            return set(known.files) == set(shown) and all(
+                np.allclose(known[key], shown[key], atol=1e-6) for key in shown
+            )
+    with atomic_path(memory.FILE) as path, path.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **shown)
+    print(f"{memory.FILE}: {len(shown)} imitations, {memory.FILE.stat().st_size} bytes")
+    return True
 
 
 if __name__ == "__main__":

@@ -87,22 +87,25 @@ def carried(route: Names, sides: dict[str, set[str]]) -> float:
     return max(1e-3, len(kept) / len(shared)) if shared else 1.0
 
 
-def recorded() -> dict[str, dict[str, float]]:
-    """Errors on the paper's recordings beside both T."""
+def recorded() -> dict[str, dict[str, Any]]:
+    """Errors on the paper's recordings beside both T, the general one with the resolution it was sampled at."""
     from syda_gym.routes.metric import transferability
     from syda_gym.routes.paper import PAPER_LENGTHS, paper_human
 
     reach = {"pepper": catalog.get("pepper").reach, **{n: sum(PAPER_LENGTHS[n]) for n in ("adult", "kid")}}
     bodies: dict[str, Any] = {"pepper": "pepper", "adult": paper_human("adult"), "kid": paper_human("kid")}
-    return {
-        f"{a} > {b}": {
+    found = {}
+    for (a, b), error in RECORDED.items():
+        general = transferability(bodies[a], bodies[b], "general")
+        found[f"{a} > {b}"] = {
             "metres": error,
             "over_arm_length": error / reach[b],
-            "T": transferability(bodies[a], bodies[b]).T,
+            "T": general.T,
+            "samples": general.samples,
+            "cell": general.cell,
             "paper_T": transferability(a, b, "paper").T,
         }
-        for (a, b), error in RECORDED.items()
-    }
+    return found
 
 
 def main() -> None:

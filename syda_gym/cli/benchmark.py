@@ -45,7 +45,9 @@ def benchmark(
 ) -> None:
     """Play every chain x method x agent x disturbance x seed on held-out actions; goes on where it stopped."""
     from syda_gym.evaluation.benchmark import BenchmarkConfig, run_benchmark
+    from syda_gym.evaluation.benchmark.choice import choice_table, route_choices
     from syda_gym.evaluation.benchmark.report import summary_table, write_benchmark_report
+    from syda_gym.files import write_json
     from syda_gym.motions.loading import load_motions
 
     settings = BenchmarkConfig.read(config) if config else BenchmarkConfig.of(SMALL)
@@ -69,9 +71,13 @@ def benchmark(
             progress=progress,
             inside=inside,
         )
-    page = write_benchmark_report(results, data, out)
+    chosen = route_choices(results, data)
+    page = write_benchmark_report(results, data, out, chosen)
     if results.select(kind="episodes").rows:
         print_table(summary_table(results.select(kind="episodes")))
+        write_json(out / "choices.json", chosen.as_list())
+        if chosen.choices:
+            print_table(choice_table(chosen))
     for failure in results.about["failures"]:
         last = failure["trace"].strip().splitlines()[-1]
         console(stderr=True).print(f"failed: {failure['cell']}: {last}", style="red", markup=False, soft_wrap=True)

@@ -40,7 +40,7 @@ def demo(
         "report": "Drawing the report",
     }
     with (
-        interruptible(f"nothing half-written is in {out}; run the demo again, it takes about a minute"),
+        interruptible(f"nothing half-written is in {out}; run the demo again, it takes a few minutes"),
         stages(words) as tell,
     ):
         result = run_demo(

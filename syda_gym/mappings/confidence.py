@@ -12,6 +12,7 @@ from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.errors import MappingError
 from syda_gym.files import shortened
 from syda_gym.mappings.models.scaling import Scaler
+from syda_gym.mappings.spreading import spread_out
 
 __all__ = ["Confidence", "action_maximum", "fit_confidence", "gain"]
 
@@ -117,10 +118,10 @@ def fit_confidence(codes: FloatArray, actions: NDArray[np.str_], bound: float | 
     labels = np.repeat(actions, codes.shape[1])
     scale = Scaler.fit(rows)
     standard = scale(rows)
-    anchors = _spread_out(standard, _ANCHORS)
+    anchors = spread_out(standard, _ANCHORS)
     names = np.unique(labels)
     if len(names) > 1:
-        apart = [_nearest(standard[labels == name], _spread_out(standard[labels != name], _ANCHORS)) for name in names]
+        apart = [_nearest(standard[labels == name], spread_out(standard[labels != name], _ANCHORS)) for name in names]
         held_out, far = np.concatenate(apart), _farthest(apart)
     else:
         # Its own frames lie on the anchors: how far another action would be is anyone's guess, so none is flagged.
@@ -193,15 +194,3 @@ def _nearest(rows: FloatArray, anchors: FloatArray) -> FloatArray:
         distance = np.sum(part**2, axis=1)[:, None] + squares - 2.0 * part @ anchors.T
         result[start : start + 4096] = np.sqrt(np.maximum(distance.min(axis=1), 0.0))
     return result
-
-
-def _spread_out(rows: FloatArray, count: int) -> FloatArray:
-    """Farthest-point subset: starts at the row nearest to the mean and adds the row farthest from those chosen."""
-    if len(rows) > 4000:
-        rows = rows[:: -(-len(rows) // 4000)]
-    chosen = [int(np.argmin(np.sum((rows - rows.mean(axis=0)) ** 2, axis=1)))]
-    distance = np.sum((rows - rows[chosen[0]]) ** 2, axis=1)
-    while len(chosen) < min(count, len(rows)) and distance.max() > 1e-12:
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.sum((rows - rows[chosen[-1]]) ** 2, axis=1))
-    return rows[chosen]

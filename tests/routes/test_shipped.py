@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from syda_gym.embodiments import catalog
+from syda_gym.evaluation.prediction.tables import links_table
 from syda_gym.routes import general, metric
 from syda_gym.routes.general import Sampling, general_workspace
 from syda_gym.routes.metric import pair_arms, transferability
+from syda_gym.routes.routing import BodyGraph, best_route
 from syda_gym.routes.shipped import shipped_comparison
 from syda_gym.routes.workspace.store import WorkspaceStore
 
@@ -42,3 +44,13 @@ def test_bundled_bodies_are_not_sampled_and_other_options_are(monkeypatch):
     for other in ({"seed": 5}, {"samples": 2**12}, {"store": WorkspaceStore()}):
         with pytest.raises(RuntimeError, match="sampled"):
             transferability("kid", "nao", "general", **other)
+
+
+def test_the_general_t_of_a_pair_is_one_value_wherever_it_is_asked():
+    """One resolution for all, and it stands in the result: T rises with the samples by some percent."""
+    t = transferability("adult", "pepper", "general")
+    assert (t.samples, t.cell) == (Sampling.samples, Sampling.cell) == (2**20, 0.1)
+    assert t.T == best_route("adult", "pepper", [("adult", "pepper")], "general").T
+    assert t.T == BodyGraph((), [("adult", "pepper")], "general").link("adult", "pepper").T
+    assert t.T == BodyGraph((), [("adult", "pepper")], predictor="T").link("adult", "pepper").T
+    assert "1,048,576 samples" in links_table([t]).title

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from syda_gym.errors import SydaError
+from syda_gym.evaluation.benchmark.choice import RouteChoices, choice_table, route_choices
 from syda_gym.evaluation.benchmark.compare import compare
 from syda_gym.evaluation.benchmark.efficiency import EfficiencyCurve, efficiency_curve, models_plot
 from syda_gym.evaluation.benchmark.results import Results
@@ -31,6 +32,7 @@ from syda_gym.evaluation.report import (
 from syda_gym.evaluation.report.model import Block, Cell
 from syda_gym.evaluation.statistics import iqm, spearman
 from syda_gym.motions.clip import Motions
+from syda_gym.routes.route import Route as ForeseenRoute
 
 __all__ = ["differences_table", "summary_table", "write_benchmark_report"]
 
@@ -38,30 +40,37 @@ _GROUP = ("route", "method", "agent", "disturbance")
 _MOST_SHOWN = 250  # chains in the playback
 
 Scores = dict[tuple[str, str], float]
+"""Transferability of links."""
+
+Foreseen = dict[str, ForeseenRoute]
+"""What the dry run expects of routes, by their names."""
 
 
-def write_benchmark_report(results: Results, motions: Motions, folder: Path) -> Path:
+def write_benchmark_report(
+    results: Results, motions: Motions, folder: Path, choices: RouteChoices | None = None
+) -> Path:
     """Writes ``report.html`` beside the results.
 
     Args:
         results: of ``run_benchmark``, with its folder.
         motions: the data set, for bodies and transferability.
         folder: where to write.
+        choices: of ``route_choices``; asked for here if ``None``.
     """
     episodes = results.select(kind="episodes")
-    scores = _link_scores(episodes, motions)
+    scores, foreseen = _link_scores(episodes, motions), _foreseen(episodes, motions)
     curve = efficiency_curve(results)
     sections: list[Section] = []
     playback = _playback(results, motions)
     if playback is not None:
         sections.append(Section("Playback", [playback]))
     if episodes.rows:
-        blocks: list[Block] = [summary_table(episodes, scores), _error_plot(episodes)]
+        blocks: list[Block] = [summary_table(episodes, foreseen), _error_plot(episodes)]
         sections.append(Section("Every chain", blocks))
         parted = differences_table(episodes)
         if parted.rows:
             sections.append(Section("Paired differences", [parted]))
-        sections.append(Section("Which way to go", _route_blocks(episodes, motions, scores)))
+        sections.append(Section("Which way to go", _route_blocks(results, motions, scores, foreseen, choices)))
     if curve is not None:
         sections.append(Section("Sample efficiency", [curve.plot(), curve.table(), models_plot()]))
     if results.about["failures"]:
@@ -78,14 +87,14 @@ def write_benchmark_report(results: Results, motions: Motions, folder: Path) -> 
     return write_report(report, folder)
 
 
-def summary_table(episodes: Results, scores: Scores | None = None) -> Table:
+def summary_table(episodes: Results, foreseen: Foreseen | None = None) -> Table:
     """Every combination of chain, method, agent and disturbance with its figures."""
     columns = [
         Column("Chain"),
         Column("Method"),
         Column("Agent"),
         Column("Disturbance"),
-        Column("T", "", 3, 1, "product of transferabilities (Eq. 11)"),
+        Column("T", "", 3, 1, "of the chain as a whole, in the dry run"),
         Column("Landmark error", "cm", 2, 100, "interquartile mean, interval over episodes stratified by action"),
         Column(
             "over actions", "cm", 2, 100, "the same with an interval over whole actions: what other motions would give"
@@ -104,11 +113,10 @@ def summary_table(episodes: Results, scores: Scores | None = None) -> Table:
     timings = _latencies(episodes)
     rows: list[list[Cell]] = []
     for key, group in episodes.groups(*_GROUP).items():
-        route = str(key[0]).split(">")
-        product = math.prod((scores or {}).get(edge, math.nan) for edge in zip(route[:-1], route[1:], strict=True))
+        known = (foreseen or {}).get(str(key[0]))
         rows.append([
             *key,
-            product,
+            known.T if known else math.nan,
             group.estimate("landmark_error"),
             group.estimate("landmark_error", over="actions"),
             group.estimate("mapping_error"),
@@ -193,29 +201,53 @@ def _error_plot(episodes: Results) -> BarPlot:
     return BarPlot("Landmark error", "landmark error [cm], interval over actions", ["all actions"], series, 100.0)
 
 
-def _route_blocks(episodes: Results, motions: Motions, scores: Scores) -> list[Block]:
+def _route_blocks(
+    results: Results, motions: Motions, scores: Scores, foreseen: Foreseen, choices: RouteChoices | None
+) -> list[Block]:
+    episodes = results.select(kind="episodes")
     first = episodes.select(**{name: episodes.rows[0][name] for name in ("method", "agent", "disturbance")})
     errors = {str(key[0]): float(iqm(group.values("mapping_error"))) for key, group in first.groups("route").items()}
     bodies = {body: motions.bodies[body].kind for edge in scores for body in edge}
     edges = [RouteEdge(a, b, score, errors.get(f"{a}>{b}")) for (a, b), score in scores.items() if math.isfinite(score)]
-    products = {
-        route: math.prod(scores.get(edge, math.nan) for edge in _edges(route)) for route in errors
-    }  # fmt: skip
-    known = {route: product for route, product in products.items() if math.isfinite(product)}
+    known = {route: foreseen[route] for route in errors if route in foreseen}
     blocks: list[Block] = []
     if known:
-        best = max(known, key=lambda route: known[route])
-        note = f"Thicker arrows carry a higher transferability; coloured: {best}, the highest product."
+        best = max(known, key=lambda route: known[route].score)
+        note = f"Thicker arrows carry a higher T; coloured: {best}, of which the dry run expects the least error."
         blocks.append(RouteGraph("Pairs by transferability", dict(bodies), edges, best.split(">"), note))
     if len(known) >= 4:
-        rank = spearman(list(known.values()), [errors[route] for route in known])
+        reach = {route: motions.bodies[route.split(">")[-1]].reach for route in known}
+        rank = spearman([-one.score for one in known.values()], [errors[route] / reach[route] for route in known])
         blocks.append(
             Text(
-                f"Rank correlation of transferability with mapping error over {rank.count} chains: {rank.value:+.2f} "
-                f"(95 % interval {rank.low:+.2f} to {rank.high:+.2f}); a useful ranking is negative."
+                f"Rank correlation of the error that the dry run expects with the mapping's, both over the arm's "
+                f"length, over {rank.count} chains: {rank.value:+.2f} (95 % interval {rank.low:+.2f} to "
+                f"{rank.high:+.2f}); a useful prediction is positive."
             )
         )
+    asked = choices or route_choices(results, motions)
+    if asked.choices:
+        blocks.append(choice_table(asked))
+    blocks += [Text(f"No route chosen for {line}") for line in asked.skipped]
     return blocks
+
+
+def _foreseen(episodes: Results, motions: Motions) -> Foreseen:
+    """The dry run of every route as a whole; those that it cannot judge are left out."""
+    from syda_gym.routes.routing import BodyGraph
+
+    names = [tuple(str(text).split(">")) for text in dict.fromkeys(row["route"] for row in episodes.rows)]
+    edges = dict.fromkeys(edge for route in names for edge in zip(route[:-1], route[1:], strict=True))
+    graph = BodyGraph((), [(motions.bodies[a], motions.bodies[b]) for a, b in edges], directed=True)
+    found: Foreseen = {}
+    for route in names:
+        try:
+            known = graph.route(route)
+        except SydaError:
+            continue
+        if known.error is not None:
+            found[">".join(route)] = known
+    return found
 
 
 def _edges(route: str) -> list[tuple[str, str]]:

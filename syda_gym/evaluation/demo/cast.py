@@ -7,16 +7,24 @@ from dataclasses import dataclass, replace
 from syda_gym.embodiments.parametric import parametric_human
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
-from syda_gym.motions.clip import Motions
+from syda_gym.mappings.limits import limit_speed
+from syda_gym.motions.clip import Motions, Take
 
-__all__ = ["FRAIL", "Cast", "cast_of", "with_frail"]
+__all__ = ["FRAIL", "SLOW", "Cast", "cast_of", "traits", "with_guests"]
 
 FRAIL = "frail"
 """A person who moves every arm angle by a fifth of the healthy range: synthetic, and only in the demo."""
 
+SLOW = "slow_nao"
+"""A NAO whose motors turn at a tenth of their speed (41 degrees a second at the shoulder's roll), led along NAO's own
+motions: it lags wherever it cannot keep up. Synthetic, and only in the demo."""
+
 _OPERATOR = "tall"
-_BETWEEN = ("adult", "nao", FRAIL, "left_only")
+_BETWEEN = ("adult", SLOW, FRAIL, "left_only")
 _MOST = 4
+_SLOW_SHARE = 0.1
+_MODEL = "nao"  # whose body the slow robot has
+_TRAITS = {SLOW: "a slow robot", FRAIL: "a person of limited mobility", "left_only": "a person tracked with one arm"}
 
 
 @dataclass(frozen=True)
@@ -46,27 +54,43 @@ class Cast:
         return (self.operator, self.robot)
 
 
-def with_frail(motions: Motions) -> Motions:
-    """The embedded motions with one person more, performing the same takes; others are returned as they are."""
+def traits(name: str) -> str:
+    """The body's name, with what is special about it."""
+    return f"{name} ({_TRAITS[name]})" if name in _TRAITS else name
+
+
+def with_guests(motions: Motions) -> Motions:
+    """The embedded motions with a frail person and a slow robot more, in the same takes; others as they are."""
     from syda_gym.motions.synthetic.generator import EMBEDDED_SEED, EMBEDDED_VARIANTS, generate
 
     if not motions.synthetic or not motions.name.startswith("embedded") or FRAIL in motions.bodies:
         return motions
-    body = parametric_human(FRAIL, stature=1.60, mobility=0.2)
-    more = generate((body,), seed=EMBEDDED_SEED, variants=EMBEDDED_VARIANTS)
+    model = motions.bodies.get(_MODEL)
+    if not isinstance(model, Robot):
+        return motions
+    frail = parametric_human(FRAIL, stature=1.60, mobility=0.2)
+    more = generate((frail,), seed=EMBEDDED_SEED, variants=EMBEDDED_VARIANTS)
     own = {take.recording: take for take in more.takes}
     if any(take.recording not in own for take in motions.takes):
         return motions  # embedded ones of another making; nobody can join them
-    takes = tuple(
-        replace(
-            take,
-            frames={**take.frames, FRAIL: own[take.recording].frames[FRAIL]},
-            filled={**take.filled, **own[take.recording].filled},
-        )
-        for take in motions.takes
-        if not take.mirrored
+    slow = _slowed(model)
+    takes = tuple(_joined(take, own[take.recording], slow) for take in motions.takes if not take.mirrored)
+    return replace(motions, takes=takes, bodies={**motions.bodies, FRAIL: frail, SLOW: slow})
+
+
+def _slowed(model: Robot) -> Robot:
+    slow = Robot(replace(model.description, name=SLOW))
+    slow.speed = _SLOW_SHARE * model.speed
+    return slow
+
+
+def _joined(take: Take, frail: Take, slow: Robot) -> Take:
+    led = {SLOW: limit_speed(slow, take.frames[_MODEL], take.fps)}
+    return replace(
+        take,
+        frames={**take.frames, FRAIL: frail.frames[FRAIL], **led},
+        filled={**take.filled, **frail.filled},
     )
-    return replace(motions, takes=takes, bodies={**motions.bodies, FRAIL: body})
 
 
 def cast_of(motions: Motions, robot: Robot) -> Cast:

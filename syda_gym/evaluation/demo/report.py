@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from syda_gym.evaluation.chains import name_of
+from syda_gym.evaluation.demo.known import without_unknown
 from syda_gym.evaluation.demo.playback import _SHOWN_HZ, _liveliest, _stride, _tracks, playback_chain
 from syda_gym.evaluation.demo.story import (
     cost_words,
@@ -326,5 +327,5 @@ def _played(chain: ChainResult) -> dict[str, Any]:
         "transferability": chain.transferability if np.isfinite(chain.transferability) else None,
         "landmark_error": chain.figure("landmark_error").to_dict(),
         "mapping_error": chain.figure("mapping_error").to_dict(),
-        "episodes": [episode.to_dict() for episode in chain.episodes],
+        **without_unknown([episode.to_dict() for episode in chain.episodes]),
     }

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from syda_gym.evaluation.chains import Route, name_of
+from syda_gym.evaluation.demo.known import without_unknown
 from syda_gym.evaluation.episodes import EpisodeFigures, Recording
 from syda_gym.evaluation.report import BarPlot, Column, CurvePlot, Headline, PlaybackChain, Table, Text
 from syda_gym.evaluation.report.model import Block, Cell
@@ -170,7 +171,7 @@ class ResidualResult:
                 agent.name: {
                     "tracking_m": list(agent.tracking),
                     "j": list(agent.costs),
-                    "episodes": [episode.to_dict() for episode in agent.episodes],
+                    **without_unknown([episode.to_dict() for episode in agent.episodes]),
                 }
                 for agent in self.agents
             },

@@ -14,7 +14,7 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, nearest_name
 from syda_gym.evaluation.chains import Links, Route, action_groups, name_of, robots_of
 from syda_gym.evaluation.demo.baselines import BASELINES, baseline
-from syda_gym.evaluation.demo.cast import Cast, cast_of, with_frail
+from syda_gym.evaluation.demo.cast import Cast, cast_of, with_guests
 from syda_gym.evaluation.demo.results import ChainResult, DemoResult
 from syda_gym.evaluation.episodes import EpisodeFigures, Recording, figures_of_all, latency, make_env, play_all
 from syda_gym.locks import locked_folder
@@ -76,7 +76,7 @@ def _run(
 
     clock = _Clock(tell)
     with clock("load"):
-        data = with_frail(load_motions(motions))
+        data = with_guests(load_motions(motions))
         driven = _robot(data, robot)
         cast = cast_of(data, driven)
         groups = _groups(data, cast.operator, driven.name, seed)

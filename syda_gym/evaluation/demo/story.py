@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from syda_gym.evaluation.chains import name_of
+from syda_gym.evaluation.demo.cast import traits
 from syda_gym.evaluation.report import BarPlot, Column, Table, Text
 from syda_gym.evaluation.report.model import Block, Cell
 from syda_gym.evaluation.statistics import Estimate, clustered_estimate, spearman
@@ -26,9 +27,10 @@ def question(result: DemoResult) -> Text:
             f"{cast.operator} was recorded with {cast.robot} alone: there is no chain to choose, and the direct pair "
             "is played."
         )
+    known = ", ".join(map(traits, cast.between))
     return Text(
         f"A new operator, {cast.operator}, has never been recorded with {cast.robot}. One session with one of "
-        f"{len(cast.between)} bodies that have been, would do: {', '.join(cast.between)}. With whom? Asked before "
+        f"{len(cast.between)} bodies that have been, would do: {known}. With whom? Asked before "
         "anything is fitted: every body imitates the operator's planned motion on paper, within its joint limits and "
         "speeds."
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 import time
 from collections.abc import Callable
@@ -23,7 +22,7 @@ from syda_gym.files import fingerprint
 from syda_gym.motions.loading import load_motions
 from syda_gym.routes.dry_run.imitation import Retargeter, track
 from syda_gym.routes.dry_run.memory import default_plan
-from syda_gym.routes.dry_run.plan import Plan
+from syda_gym.routes.dry_run.plan import FPS, Plan
 from syda_gym.routes.dry_run.rehearsal import DEPTH_CAMERA, Rehearsal
 from syda_gym.routes.measured import fit_options
 from syda_gym.routes.metric import Transferability, transferability
@@ -32,7 +31,7 @@ __all__ = ["DRY_RUNS", "BedJob", "BedSettings", "bed_routes", "open_bed"]
 
 Names = tuple[str, ...]
 
-_FORMAT = "1"  # of what is computed; another one is computed anew
+_FORMATS = {"session": "1", "dry_run": "2", "T": "1"}  # of what is computed; another one is computed anew
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +60,7 @@ class BedSettings:
         """Everything that decides what a job gives."""
         bodies = [_mark(body) for body in self.bed.bodies.values()]
         numbers = (self.folds, self.fps, self.max_hops, self.method, self.preset, self.seed)
-        return fingerprint("bed", _FORMAT, *bodies, self.bed.plan.fingerprint, repr(numbers), repr(job))
+        return fingerprint("bed", _FORMATS[job.kind], *bodies, self.bed.plan.fingerprint, repr(numbers), repr(job))
 
 
 def _mark(body: Embodiment) -> str:
@@ -195,25 +194,12 @@ def _half(plan: Plan) -> Plan:
 
 
 def _without_speeds(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
-    fast = copy.copy(robot)
-    fast.speed = np.full_like(robot.speed, np.inf)
-    return track(fast, index, wanted)
-
-
-def by_limb_ik(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
-    """The library's own solver as retargeter: nearest pose frame by frame, then cut to the joints' speeds."""
-    from syda_gym.mappings.limits import limit_speed
-    from syda_gym.routes.dry_run.plan import FPS
-
-    clips = len(wanted)
+    """As the default, by motors that know no limit."""
+    solver, part = LimbIK.of(robot), robot.arm_slices[index]
     both = np.repeat(wanted[:, :, None], len(robot.sides), axis=2)
-    part = robot.arm_slices[index]
-    reached = np.empty_like(wanted)
-    for k in range(clips):
-        angles = limit_speed(robot, robot.clamp(LimbIK(robot).solve(both[k])), FPS)
-        limbs = np.diff(robot.chains[index].points(angles[:, part])[:, :3], axis=1)
-        reached[k] = limbs / np.maximum(np.linalg.norm(limbs, axis=-1, keepdims=True), 1e-9)
-    return reached
+    angles, _ = solver.follow(both, solver.begin(len(wanted)), 1.0 / FPS, limited=False)
+    limbs = np.diff(robot.chains[index].points(angles[:, :, part].reshape(-1, part.stop - part.start))[:, :3], axis=1)
+    return np.asarray(limbs / np.maximum(np.linalg.norm(limbs, axis=-1, keepdims=True), 1e-9)).reshape(wanted.shape)
 
 
 def _as_recorded(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
@@ -239,7 +225,7 @@ DRY_RUNS: dict[str, Callable[[BedSettings], Rehearsal]] = {
     "sensors half as noisy": lambda settings: _sensors(settings, 0.5),
     "sensors twice as noisy": lambda settings: _sensors(settings, 2.0),
     "without joint speeds": lambda settings: _retargeted(settings, _without_speeds),
-    "poses by LimbIK": lambda settings: _retargeted(settings, by_limb_ik),
+    "tracked by Gauss-Newton steps": lambda settings: _retargeted(settings, track),
     "recording procedure known": lambda settings: _retargeted(settings, _as_recorded),
 }
 """Variants of the dry run; the first is the default."""

@@ -18,7 +18,7 @@ _COLORS = (OPERATOR, ROBOT, "#8fb0ea", "#b9c2cd")  # of one hop and more; to be 
 
 def prediction_png(
     study: PredictionStudy,
-    predictors: Sequence[str] = ("T", "hops", "training_error", "measured"),
+    predictors: Sequence[str] = ("T", "hops", "dry_run", "measured"),
     width: float = 13.0,
     ground: str = "day",
 ) -> bytes:

@@ -19,6 +19,8 @@ from syda_gym.evaluation.prediction.scores import score_predictors
 from syda_gym.evaluation.prediction.trial import BedFrames, Progress, fit_all, held_out_errors
 from syda_gym.motions.clip import Motions
 from syda_gym.motions.loading import load_motions
+from syda_gym.routes.dry_run.memory import default_plan
+from syda_gym.routes.dry_run.rehearsal import Rehearsal
 from syda_gym.routes.general import Sampling
 from syda_gym.routes.measured import fit_options, measured_bodies
 from syda_gym.routes.metric import Transferability, transferability
@@ -77,7 +79,7 @@ def validate(
     groups = np.array_split(np.random.default_rng(seed).permutation(table.distinct), folds)
     fits = fit_all(table, groups, method, preset, seed, fit_options(preset, fps), progress)
     training, errors = held_out_errors(table, groups, fits, max_hops, progress)
-    routes = _results(table.bodies, links, alpha_from_noise(noise), training, errors)
+    routes = _results(table.bodies, links, alpha_from_noise(noise), training, errors, seed)
     complete = [route for route in routes if all(len(table.bodies[name].sides) == 2 for name in route.bodies)]
     partial = 0 < len(complete) < len(routes)
     return PredictionStudy(
@@ -124,9 +126,10 @@ def _results(
     alpha: dict[frozenset[str], float],
     training: dict[tuple[str, str], float],
     errors: dict[Names, float],
+    seed: int,
 ) -> tuple[RouteResult, ...]:
     results = []
-    quality = measured_bodies(training)
+    quality, together = measured_bodies(training), Rehearsal(bodies, default_plan(), seed=seed)
     for route, metres in errors.items():
         steps = list(zip(route[:-1], route[1:], strict=True))
         general = [links["general"][step] for step in steps]
@@ -143,6 +146,7 @@ def _results(
         }
         carried = _carried(bodies, route)
         predicted = {name: carried * float(np.prod(values)) for name, values in products.items()}
+        predicted["dry_run"] = -float(together.error(route).mean())
         predicted["arm_length_ratio"] = links["general"][route[0], route[-1]].L
         predicted["hops"] = -float(len(steps))
         predicted["training_error"] = -sum(training[step] for step in steps) / max(carried, 1e-3)

@@ -34,7 +34,13 @@ def links_table(links: Sequence[Transferability]) -> Table:
         columns.append(Column("alpha", digits=2, tip="noise coefficient"))
         rows = [[*row, t.alpha] for row, t in zip(rows, links, strict=True)]
     notes = dict.fromkeys(f"{t.source} > {t.target}: {note}" for t in links for note in t.notes)
-    return Table(f"Transferability, {links[0].definition} definition", columns, rows, "\n".join(notes))
+    return Table(_title(links[0]), columns, rows, "\n".join(notes))
+
+
+def _title(link: Transferability) -> str:
+    """With the resolution, on which the general T depends by some percent."""
+    at = "" if link.samples is None else f", {link.samples:,} samples, cells of {link.cell:g} arm lengths"
+    return f"Transferability, {link.definition} definition{at}"
 
 
 def _rehearsed_table(links: Sequence[Transferability]) -> Table:

@@ -8,19 +8,20 @@ import numpy as np
 
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
+from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import EmbodimentError
 from syda_gym.motions.synthetic.range_of_motion import within_range
 from syda_gym.routes.dry_run.plan import FPS, Plan
 
-__all__ = ["SIDES", "Retargeter", "imitate", "track"]
+__all__ = ["SIDES", "Retargeter", "follow", "imitate", "track"]
 
 SIDES = ("left", "right")
 
 Retargeter = Callable[[Robot, int, FloatArray], FloatArray]
 """A robot, the index of one of its arms and wanted directions ``(K, T, 2, 3)`` of K clips at ``FPS``; gives the
-directions ``(K, T, 2, 3)`` that the arm reaches. ``track`` is the default; whoever records in another way passes the
-way in which they record, because the imitation has to be that of the recordings."""
+directions ``(K, T, 2, 3)`` that the arm reaches. By default a robot does what ``follow`` says; whoever records in
+another way passes the way in which they record, because the imitation has to be that of the recordings."""
 
 _PULL = 1e-3  # towards the middle of the joint range, where an arm has joints to spare
 _DAMPING = 3e-3
@@ -32,12 +33,13 @@ _TOP_SPEED = 20.0  # rad/s; where a URDF gives none
 def imitate(body: Embodiment, plan: Plan, retargeter: Retargeter | None = None) -> list[dict[str, FloatArray]]:
     """The best imitation of every clip of a plan.
 
-    A human imitates exactly, within the range of motion if one is known. A robot imitates by ``retargeter``.
+    A human imitates exactly, within the range of motion if one is known. A robot imitates by ``retargeter``, or by the
+    library's own solver, which leads all its arms together.
 
     Args:
         body: who imitates.
         plan: what.
-        retargeter: of robots; ``track`` by default.
+        retargeter: of robots, arm by arm; ``follow`` by default.
 
     Returns:
         Per clip, side to unit limb directions ``(T, 2, 3)``, for the arms that the body has.
@@ -49,13 +51,17 @@ def imitate(body: Embodiment, plan: Plan, retargeter: Retargeter | None = None) 
     wanted = np.stack(
         [np.concatenate([clip, np.repeat(clip[-1:], longest - len(clip), axis=0)]) for clip in plan.clips]
     )
-    arms = {side: _arm(body, index, side, wanted, retargeter or track) for index, side in enumerate(body.sides)}
+    own = follow(body, wanted) if isinstance(body, Robot) and retargeter is None else None
+    arms = {
+        side: _arm(body, index, side, wanted, retargeter) if own is None else own[:, :, index]
+        for index, side in enumerate(body.sides)
+    }
     return [{side: arm[k, : len(clip)] for side, arm in arms.items()} for k, clip in enumerate(plan.clips)]
 
 
-def _arm(body: Embodiment, index: int, side: str, wanted: FloatArray, retargeter: Retargeter) -> FloatArray:
+def _arm(body: Embodiment, index: int, side: str, wanted: FloatArray, retargeter: Retargeter | None) -> FloatArray:
     arm = wanted[:, :, SIDES.index(side)]
-    if isinstance(body, Robot):
+    if isinstance(body, Robot) and retargeter is not None:
         found = np.asarray(retargeter(body, index, arm), dtype=np.float64)
         if found.shape != arm.shape or not np.isfinite(found).all():
             raise EmbodimentError(
@@ -71,10 +77,31 @@ def _arm(body: Embodiment, index: int, side: str, wanted: FloatArray, retargeter
     return flat.reshape(arm.shape)
 
 
-def track(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
-    """Warm-started damped Gauss-Newton on limb directions, all clips side by side.
+def follow(robot: Robot, wanted: FloatArray) -> FloatArray:
+    """What the robot does when the library itself leads it: ``LimbIK`` frame after frame, within joint speeds.
 
-    Each frame starts from the one before and moves no joint faster than its motor can, so that a slow robot lags.
+    Args:
+        robot: whose arms.
+        wanted: ``(K, T, 2, 2, 3)`` unit directions of K clips at ``FPS``: left and right arm, upper arm and forearm.
+
+    Returns:
+        ``(K, T, arms, 2, 3)`` directions reached, for the arms that the robot has.
+    """
+    solver, sides = LimbIK.of(robot), [SIDES.index(side) for side in robot.sides]
+    angles, _ = solver.follow(wanted[:, :, sides], solver.begin(len(wanted)), 1.0 / FPS)
+    clips, frames = wanted.shape[:2]
+    reached = np.empty((clips, frames, len(sides), 2, 3))
+    for index, (chain, part) in enumerate(zip(robot.chains, robot.arm_slices, strict=True)):
+        points = chain.points(angles[:, :, part].reshape(clips * frames, -1))
+        reached[:, :, index] = _limbs(points).reshape(clips, frames, 2, 3)
+    return reached
+
+
+def track(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
+    """Warm-started damped Gauss-Newton on limb directions, all clips side by side: plain NumPy, nothing is compiled.
+
+    Each frame starts from the one before and moves no joint faster than its motor can, so that a slow robot lags. It
+    was the default before ``follow``, which comes nearer to the wanted directions.
 
     Args:
         robot: whose arm.
@@ -97,10 +124,14 @@ def track(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
         for _ in range(_STEPS):
             q = arm.step(q, goal[:, frame], low, high)
         angles[:, frame] = q
-    points = arm.chain.points(angles.reshape(-1, arm.n))[:, :3].reshape(clips, frames, 3, 3)
-    limbs = np.diff(points, axis=2)
-    reached: FloatArray = limbs / np.maximum(np.linalg.norm(limbs, axis=-1, keepdims=True), 1e-9)
-    return reached
+    return _limbs(arm.chain.points(angles.reshape(-1, arm.n))).reshape(wanted.shape)
+
+
+def _limbs(points: FloatArray) -> FloatArray:
+    """Unit directions ``(N, 2, 3)`` of upper arm and forearm."""
+    limbs = np.diff(points[:, :3], axis=1)
+    unit: FloatArray = limbs / np.maximum(np.linalg.norm(limbs, axis=-1, keepdims=True), 1e-9)
+    return unit
 
 
 class _Arm:

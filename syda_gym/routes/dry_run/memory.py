@@ -61,7 +61,7 @@ def imitation_key(body: Embodiment, clip: FloatArray) -> str:
         array.tobytes() for chain in chains for array in (chain.axes, chain.lower, chain.upper, chain.point_offsets)
     ]
     speed = np.asarray(getattr(body, "speed", ())).tobytes()
-    return fingerprint("imitation 1", spec, *numbers, speed, clip.tobytes())
+    return fingerprint("imitation 2", spec, *numbers, speed, clip.tobytes())
 
 
 @lru_cache(maxsize=1)

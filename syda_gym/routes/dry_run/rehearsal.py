@@ -97,7 +97,7 @@ class Rehearsal:
         plan: what the operator means to do.
         sensor: name to the noise of a landmark [m]; by default ``DEPTH_CAMERA`` for humans and 0 for robots.
         imprecision: name to imprecision per axis [arm lengths]; by default ``IMPRECISION``.
-        retargeter: how robots imitate; ``imitation.track`` by default.
+        retargeter: how robots imitate; ``imitation.follow``, the library's own solver, by default.
         seed: of folds and noise.
 
     Raises:

@@ -54,9 +54,9 @@ def test_the_recorder_is_not_the_predictor_s_solver(bed: TestBed) -> None:
 def test_everything_is_scored_and_finished_pieces_are_taken_again(bed: TestBed, tmp_path) -> None:
     settings = BedSettings(bed, folds=2, method="geometric", preset="fixed")
     pool = InlinePool(open_bed, settings)
-    kept = ["planned motion", "sensors twice as noisy"]
+    kept = ["planned motion", "without joint speeds", "tracked by Gauss-Newton steps"]
     found = study_bed(settings, tmp_path, sessions=2, dry_runs=kept, pool=pool, resamples=20)
-    assert pool.computed == len(bed_jobs(2, kept)) == 6
+    assert pool.computed == len(bed_jobs(2, kept)) == 7
     assert (found["pairs"], found["chains"]) == (12, 24)
     for name in (*kept, "T general", "hops", "measured", "coverage"):
         scores = found["scores"][name]

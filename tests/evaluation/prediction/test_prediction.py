@@ -34,6 +34,7 @@ def test_every_route_is_scored_on_actions_that_no_link_has_seen(few: Motions) ->
         links = [study.links[step].T for step in zip(route.bodies[:-1], route.bodies[1:], strict=True)]
         assert route.predicted["T"] == pytest.approx(np.prod(links))
         assert route.predicted["hops"] == -route.hops
+        assert -0.5 < route.predicted["dry_run"] < 0.0
     again = validate(few, **options)
     assert json.dumps(again.as_dict()) == json.dumps(study.as_dict())
     picture = prediction_png(study, ("T", "measured"))
