@@ -13,6 +13,7 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.teleoperation.safety.detour import Detour
 from syda_gym.teleoperation.safety.limiter import CommandLimiter
 from syda_gym.teleoperation.safety.pace import Pace, braking_speed
+from syda_gym.teleoperation.safety.punctuality import GENTLE
 from syda_gym.teleoperation.safety.self_collision import SelfCollision
 from syda_gym.teleoperation.safety.slide import slide
 
@@ -20,6 +21,7 @@ __all__ = ["Motion", "Moved"]
 
 _LOOK = 0.1  # rad; how far apart the looked-at poses of a way to a standstill are
 _STANDING = 1e-9  # rad/s
+_ROUNDING = 1e-9  # rad
 _DAMPING = 8.0  # 1/s; share of a pair's distance by which it may shrink in a second
 _NEAR = 0.08  # m; pairs further apart do not take part in sliding
 _SAME_GOAL = 0.2  # rad; a target that moves less is the same one, with noise
@@ -69,7 +71,7 @@ class Motion:
         self.command = limiter.start(start)
         self._limiter = limiter
         self._collision = collision if collision is not None and collision.available else None
-        self._most = acceleration * (1.0 - 1e-9)
+        self._most = GENTLE * acceleration  # the rest is for commands that leave late
         self._jerk = jerk
         self._pace = Pace(period, len(start))
         self._now = 0.0
@@ -139,7 +141,7 @@ class Motion:
     def twin(self) -> Motion:
         """A copy whose steps change nothing of this one; it does not look for detours."""
         twin = copy.copy(self)
-        twin._pace, twin._trail = copy.copy(self._pace), self._trail.copy()
+        twin._pace, twin._trail = self._pace.twin(), self._trail.copy()
         twin._search, twin._searching, twin._next_search, twin._way = None, False, math.inf, list(self._way)
         return twin
 
@@ -190,16 +192,11 @@ class Motion:
         cap = min(max(factor, 0.0), 1.0) * self._limiter.speed * (1.0 - 1e-9)
         high = np.maximum(np.minimum(high, cap), slowest)
         low = np.minimum(np.maximum(low, -cap), fastest)
-        return np.minimum(low, high), np.maximum(low, high)
+        return pace.tempered(np.minimum(low, high), np.maximum(low, high), self._most)
 
     def _braked(self) -> FloatArray:
         """The velocity of the first step to a standstill."""
-        velocity, change = self._pace.velocity, self._pace.change
-        if self._in_line:
-            longest = float((np.abs(velocity) / self._most).max())
-            return velocity * max(0.0, 1.0 - change / longest) if longest > 0.0 else velocity
-        slower: FloatArray = np.sign(velocity) * np.maximum(np.abs(velocity) - self._most * change, 0.0)
-        return slower
+        return self._pace.slowed(self._most, alike=self._in_line)
 
     def _try(self, velocity: FloatArray) -> bool:
         """Takes a step if it and the way to a standstill after it are within limits and free."""
@@ -271,7 +268,8 @@ class Motion:
     def _go(self, velocity: FloatArray) -> None:
         end = self._end(velocity)
         if not self._limiter.allows(end):  # rounding at the edge of a coupled limit
-            end = self.command
+            inside = self._limiter.start(end)
+            end = inside if float(np.abs(inside - end).max()) < _ROUNDING else self.command
         self._step = end - self.command
         self.command = end
         if self._overlaps and self._step.any():
