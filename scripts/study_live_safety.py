@@ -201,13 +201,22 @@ def wire(args: argparse.Namespace) -> dict[str, Any]:
         with UdpSink(robot, port=port) as sink:
             while receiver.is_alive() and not pipes[0].poll():
                 run(source, loop, sink, seconds=1.0, rest_at_end=False)
-            stamps, path, stopped = pipes[0].recv()
+            stamps, path, states = pipes[0].recv()
         for process in others:
             process.kill()
         receiver.join()
         dropped = dict(source.inbox.dropped)
+    stopped = np.array([state == State.STOPPED.value for state in states])
     figures = _judge(robot, loop.acceleration, stamps, path, stopped)
-    return {"runs": 1, "rate_hz": args.rate, **figures, "dropped": dropped, "load_average": os.getloadavg()[0]}
+    states = {state: states.count(state) for state in sorted(set(states))}
+    return {
+        "runs": 1,
+        "rate_hz": args.rate,
+        **figures,
+        "states": states,
+        "dropped": dropped,
+        "load_average": os.getloadavg()[0],
+    }
 
 
 def _judge(robot: Robot, most: FloatArray, stamps: FloatArray, path: FloatArray, stopped: Any) -> dict[str, Any]:
@@ -220,6 +229,10 @@ def _judge(robot: Robot, most: FloatArray, stamps: FloatArray, path: FloatArray,
     faster = (np.abs(velocity[1:]) > np.abs(velocity[:-1])) & ~emergency[:, None]
     slower = ~faster & ~emergency[:, None]
     check = SelfCollision(robot)
+    for row, joint in np.argwhere((change > 1.02) & ~emergency[:, None]):
+        share = (velocity[row : row + 2, joint] / robot.speed[joint]).round(3).tolist()
+        print(f"{change[row, joint]:.2f} of the limit at {row}, {robot.joint_names[joint]}, {share} of its speed limit, "
+              f"intervals {(1e3 * dt[max(row - 2, 0) : row + 3]).round(2).tolist()} ms")  # fmt: skip
     return {
         "commands": len(path),
         "limit_violations": int(robot.violations(path, 0.0).sum()),
@@ -243,7 +256,7 @@ def _judge(robot: Robot, most: FloatArray, stamps: FloatArray, path: FloatArray,
 def _receive(pipe: Any, count: int) -> None:
     with contextlib.suppress(OSError, AttributeError):
         os.nice(-5)
-    stamps, path, stopped, base = list[float](), list[list[float]](), list[bool](), 0
+    stamps, path, states, base = list[float](), list[list[float]](), list[str](), 0
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.bind(("127.0.0.1", 0))
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
@@ -256,8 +269,8 @@ def _receive(pipe: Any, count: int) -> None:
             stamps.append(full - base + 1e-9 * nanoseconds)
             content = json.loads(data)
             path.append(list(content["joints"].values()))
-            stopped.append(content["state"] == State.STOPPED.value)
-    pipe.send((np.array(stamps), np.array(path), np.array(stopped)))
+            states.append(str(content["state"]))
+    pipe.send((np.array(stamps), np.array(path), states))
 
 
 def _send(port: int, rate: float, seconds: float, seed: int) -> None:

@@ -13,7 +13,7 @@ SPACING = 0.7
 """Share of the period by which two commands are kept apart at the least, where frames come unevenly."""
 
 _RECENT = 16  # steps
-_MANY = 60  # steps
+_RESERVE = 1.5  # how much later than ever lately a command may leave
 _MEMORY = 20.0  # s for which a late command makes the robot slower
 _CAUTION = 5.0  # s at the beginning in which nobody knows yet how late commands will be
 
@@ -45,8 +45,8 @@ class Punctuality:
         self.least = 0.0
         self.seconds = math.inf
         self._lates: tuple[float, ...] = ()
-        self._steps: tuple[float, ...] = ()
-        self._worst: tuple[tuple[float, float], ...] = ()  # time and lateness, each less late than those before
+        self._worst: tuple[tuple[float, float], ...] = ()  # time and lateness, each less than those before
+        self._shortest: tuple[tuple[float, float], ...] = ()  # time and step, each longer than those before
         self._careful_until: float | None = None
 
     def saw(self, now: float, step: float, late: float, known: bool) -> None:
@@ -59,11 +59,11 @@ class Punctuality:
             known: whether the source knows when commands leave.
         """
         self._lates = (*self._lates[1 - _RECENT :], late)
-        self._steps = (*self._steps[1 - _MANY :], step)
         self.least = max(0.0, min(self._lates))
-        extra = late - self.least
+        extra = _RESERVE * (late - self.least)
         self._worst = (*(one for one in self._worst if one[1] > extra and now - one[0] < _MEMORY), (now, extra))
-        worst, shortest = self._worst[0][1], min(self._steps)
+        self._shortest = (*(one for one in self._shortest if one[1] < step and now - one[0] < _MEMORY), (now, step))
+        worst, shortest = self._worst[0][1], self._shortest[0][1]
         if known:
             self._careful_until = now + _CAUTION if self._careful_until is None else self._careful_until
             if now < self._careful_until:
