@@ -43,13 +43,13 @@ KILLS = 20
 CONTENDERS = ["ridge/general", "geometric/procrustes"]
 TRAINING = ResidualConfig(
     base="kalman",
-    steps=4096,
+    steps=1536,
     robots=8,
     rollout=32,
     batch=64,
-    epochs=4,
-    legs=8,
-    episodes=4,
+    epochs=2,
+    legs=6,
+    episodes=3,
     validation_episodes=2,
     hidden=(32,),
 )
@@ -119,10 +119,13 @@ def training(root: Path) -> Work:
 def killed(work: Work, root: Path, count: int, seed: int) -> dict[str, Any]:
     """Kills and goes on until ``count`` kills were had; every end is compared with the undisturbed one."""
     rng = random.Random(seed)
-    start = time.monotonic()
-    _finish(work, root / "whole", 0)
-    length = time.monotonic() - start
+    work.start(root / "whole", 0)  # here, so that children find everything loaded
     wanted = work.content(root / "whole")
+    start = time.monotonic()
+    _finish(work, root / "again", 0)
+    length = time.monotonic() - start
+    if work.content(root / "again") != wanted:
+        raise SystemExit("two undisturbed runs differ")
     found: dict[str, Any] = {"kills": 0, "after_parts": [], "finished_runs": 0, "equal": True, "orphans": 0}
     moments, folder = [], root / "run0"
     while found["kills"] < count:

@@ -231,8 +231,8 @@ def _judge(robot: Robot, most: FloatArray, stamps: FloatArray, path: FloatArray,
     check = SelfCollision(robot)
     for row, joint in np.argwhere((change > 1.02) & ~emergency[:, None]):
         share = (velocity[row : row + 2, joint] / robot.speed[joint]).round(3).tolist()
-        print(f"{change[row, joint]:.2f} of the limit at {row}, {robot.joint_names[joint]}, {share} of its speed limit, "
-              f"intervals {(1e3 * dt[max(row - 2, 0) : row + 3]).round(2).tolist()} ms")  # fmt: skip
+        around = (1e3 * dt[max(row - 2, 0) : row + 3]).round(2).tolist()
+        print(f"{change[row, joint]:.2f} of the limit at {row}: {share} of a joint's speed, intervals {around} ms")
     return {
         "commands": len(path),
         "limit_violations": int(robot.violations(path, 0.0).sum()),

@@ -18,7 +18,7 @@ from syda_gym.errors import EmbodimentError, MissingExtraError
 __all__ = ["converted_apart"]
 
 _SECONDS = 60.0  # on the wall, for a busy machine
-_PROCESSOR = 20  # s
+_PROCESSOR = 10  # s
 _MEMORY = 4 << 30  # bytes of addresses, of which libraries take one or two without using them
 _MOST = 32 << 20  # bytes of the URDF
 _REFUSED = 4  # exit code

@@ -107,7 +107,9 @@ class Pace:
         """
         speed = self._faster * np.abs(self._was)
         need = most * self._braking
-        share = np.maximum(1.0 - need / np.maximum(speed, _TINY), 0.0) * self._faster * self._lasts / max(self.dt, _TINY)
+        share = (
+            np.maximum(1.0 - need / np.maximum(speed, _TINY), 0.0) * self._faster * self._lasts / max(self.dt, _TINY)
+        )
         if alike:
             share = share[np.argmin(need / np.maximum(speed, _TINY))]
         result: FloatArray = self._was * np.minimum(share, 1.0)
@@ -124,7 +126,9 @@ class Pace:
         low, high = np.maximum(low, -harmless), np.minimum(high, harmless)
         low = np.where(slowed > 0.0, np.maximum(low, slowed), low)
         high = np.where(slowed < 0.0, np.minimum(high, slowed), high)
-        return np.where(slowed < 0.0, np.minimum(low, slowed), low), np.where(slowed > 0.0, np.maximum(high, slowed), high)
+        return np.where(slowed < 0.0, np.minimum(low, slowed), low), np.where(
+            slowed > 0.0, np.maximum(high, slowed), high
+        )
 
     def end(self, now: float, step: FloatArray) -> None:
         """The command was found: the last one plus ``step`` ``(n,)`` [rad]."""

@@ -74,9 +74,9 @@ def record_session(
     limb directions then.
 
     The robot moves, so it obeys meanwhile, within a tick: ``stop`` is an emergency stop and ends the session, ``pause``
-    holds the robot until ``resume`` and plays the prompt again from its beginning, ``rest``, the end of the source and a
-    signal (Ctrl-C, SIGTERM, SIGHUP) end the session by way of the rest pose, a second signal there is a stop. Takes that
-    are complete are kept.
+    holds the robot until ``resume`` and plays the prompt again from its beginning, ``rest``, the end of the source and
+    a signal (Ctrl-C, SIGTERM, SIGHUP) end the session by way of the rest pose, a second signal there is a stop. Takes
+    that are complete are kept.
 
     Args:
         source: delivers the person's frames and requests; started.
@@ -136,9 +136,7 @@ def record_session(
     return Session(motions, alignments, quality, left_out)
 
 
-def _played(
-    stage: _Stage, prompt: MotionClip, number: str, say: Callable[[str], None]
-) -> tuple[_Track, _Track]:
+def _played(stage: _Stage, prompt: MotionClip, number: str, say: Callable[[str], None]) -> tuple[_Track, _Track]:
     """What the person and the robot did; from the beginning again after a pause."""
     while True:
         try:
