@@ -290,11 +290,11 @@ def _send(port: int, rate: float, seconds: float, seed: int) -> None:
             for _ in range(int(rng.choice([0, 1, 2], p=[0.1, 0.8, 0.1]))):
                 sock.sendto(packet, ("127.0.0.1", port))
             index += 1
-            if rng.random() < 0.1 / rate:
-                for control in ("stop", "release", "resume"):
+            for chance, controls in ((0.1, ("stop", "release", "resume")), (1.0, ("resume",))):
+                for control in controls if rng.random() < chance / rate else ():
                     sock.sendto(encode_request(index, time.monotonic(), control), ("127.0.0.1", port))
                     index += 1
-                    time.sleep(0.2)
+                    time.sleep(0.2 if len(controls) > 1 else 0.0)
             time.sleep(float(rng.exponential(0.5) + 0.5) / rate if rng.random() > 0.002 else 0.5)
 
 
