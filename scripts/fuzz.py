@@ -54,6 +54,8 @@ def main() -> int:
         result = read_json(options.out)
     with tempfile.TemporaryDirectory() as folder:
         targets = [target for target in all_targets(Path(folder)) if options.only in target.name]
+        for target in targets:  # libraries that are loaded on first use are no input's doing
+            attempt(target, target.samples[0])
         limit_memory()
         if options.each:
             found = each_builder(targets, options.each)

@@ -56,6 +56,21 @@ def large_yaml(samples: list[bytes], rng: np.random.Generator) -> bytes:
     return samples[0] + b"".join(b"k%d: [1, 2, 3]\n" % i for i in range(_some(rng, 9_000, 60_000)))
 
 
+def merge_keys(samples: list[bytes], rng: np.random.Generator) -> bytes:
+    """Merge keys that multiply, of lists, of themselves, or of what is no mapping."""
+    count = _some(rng, 10, 200, 3_000)
+    which = _some(rng, 0, 1, 2, 3)
+    if which == 0:
+        lines = [b"a0: &a0 {x0: 1, y0: 2}"]
+        lines += [b"a%d: &a%d {<<: [*a%d, *a%d], x%d: 1}" % (i, i, i - 1, i - 1, i) for i in range(1, min(count, 60))]
+        return b"\n".join(lines)
+    if which == 1:
+        return samples[0] + b"\nm: &m {k: 1}\nn: {<<: [" + b", ".join([b"*m"] * count) + b"]}\n"
+    if which == 2:
+        return b"<<: 3\n" + samples[0]
+    return b"a: &a {b: 1}\n" + b"".join(b"k%d: {<<: *a, <<: *a, ? {<<: *a} : 1}\n" % i for i in range(count))
+
+
 # URDF
 
 
@@ -253,6 +268,22 @@ def other_sizes(samples: list[bytes], rng: np.random.Generator) -> bytes:
     return _tensors(entries)
 
 
+def zero_spreads(samples: list[bytes], rng: np.random.Generator) -> bytes:
+    """Good weights in which one table of positive numbers holds a zero, a negative or no number at all."""
+    entries = _entries(samples[int(rng.integers(len(samples)))])
+    names = [name for name in entries if any(word in name for word in ("std", "spread", "scale", "sd"))]
+    name = str(rng.choice(np.array(names or sorted(entries))))
+    kind, shape, content = entries[name]
+    values = np.frombuffer(content, dtype={"F64": "<f8", "F32": "<f4"}.get(kind, "<f4")).copy()
+    bad = [0.0, -1.0, np.nan, np.inf, 0.0][_some(rng, 0, 1, 2, 3, 4)]
+    if rng.random() < 0.5 or not len(values):
+        values[:] = bad
+    else:
+        values[int(rng.integers(len(values)))] = bad
+    entries[name] = (kind, shape, values.tobytes())
+    return _tensors(entries)
+
+
 def other_types(samples: list[bytes], rng: np.random.Generator) -> bytes:
     """Types of numbers that numpy has not, or that are not floats."""
     entries = _entries(samples[0])
@@ -373,6 +404,38 @@ def workbook_elsewhere(samples: list[bytes], rng: np.random.Generator) -> bytes:
     return _zip(result)
 
 
+def workbook_strings(samples: list[bytes], rng: np.random.Generator) -> bytes:
+    """One shared string of megabytes, in thousands of cells; or millions of strings; or one of very many runs."""
+    with zipfile.ZipFile(io.BytesIO(samples[0])) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    which = _some(rng, 0, 1, 2)
+    long, rows = _some(rng, 10_000, 3_000_000), _some(rng, 2, 30_000)
+    item = b"<si><t>" + b"x" * long + b"</t></si>"
+    if which == 1:
+        item = b"<si><t>x</t></si>" * _some(rng, 100, 1_500_000)
+    if which == 2:
+        item = b"<si>" + b"<r><t>xxxxxxxx</t></r>" * _some(rng, 100, 200_000) + b"</si>"
+    name = str(rng.choice(np.array(["xl/sharedStrings.xml", "xl/sharedStrings.xml", "xl/other.xml"])))
+    members[name] = b'<?xml version="1.0"?><sst>' + item + b"</sst>"
+    content = members["[Content_Types].xml"].replace(
+        b"</Types>",
+        b'<Override PartName="/%s" ContentType="application/vnd.openxmlformats-officedocument.spreadsheetml.'
+        b'sharedStrings+xml"/></Types>' % name.encode(),
+    )
+    members["[Content_Types].xml"] = content
+    rels = "xl/_rels/workbook.xml.rels"
+    members[rels] = members[rels].replace(
+        b"</Relationships>",
+        b'<Relationship Id="rId999" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/'
+        b'sharedStrings" Target="%s"/></Relationships>' % name.removeprefix("xl/").encode(),
+    )
+    cells = b"".join(b'<row r="%d"><c r="A%d" t="s"><v>0</v></c></row>' % (i, i) for i in range(2, rows))
+    for sheet in list(members):
+        if "worksheets/sheet" in sheet:
+            members[sheet] = members[sheet].replace(b"</sheetData>", cells + b"</sheetData>")
+    return _zip(members)
+
+
 # text of recordings
 
 
@@ -437,6 +500,21 @@ def ntu_counts(_: list[bytes], rng: np.random.Generator) -> bytes:
     return f"{counts[0]}\n{counts[1] % 7}\n7 0 1 1 1 1 0 0.1 0.1 2\n{joints}\n{row}\n".encode()
 
 
+def _elsewhere(rng: np.random.Generator) -> Any:
+    """A tensor that says it lies in a device, outside of the folder, or in a file of any size."""
+    from onnx import TensorProto
+
+    tensor = TensorProto(name="w", data_type=TensorProto.DOUBLE, data_location=TensorProto.EXTERNAL)
+    tensor.dims.append(_some(rng, 3, 10**9))
+    places = ["/dev/zero", "../../../../../../../etc/passwd", "agent.onnx", "", "x" * 5_000]
+    values = {"location": places[_some(rng, 0, 1, 2, 3, 4)], "offset": str(_some(rng, 0, -1, 10**12))}
+    values |= {"length": str(_some(rng, 24, 0, 10**12))}
+    for key, value in values.items():
+        entry = tensor.external_data.add()
+        entry.key, entry.value = key, value
+    return tensor
+
+
 def onnx_cards(samples: list[bytes], rng: np.random.Generator) -> bytes:
     """Graphs that onnxruntime takes, with cards that say nothing, too much, or something else."""
     import onnx
@@ -447,6 +525,8 @@ def onnx_cards(samples: list[bytes], rng: np.random.Generator) -> bytes:
     for index in range(_some(rng, 0, 0, 990)):
         nodes.append(helper.make_node("Identity", [f"y{index - 1}" if index else "y"], [f"y{index}"]))
     graph = helper.make_graph(nodes, "g", [port], [helper.make_tensor_value_info("y", TensorProto.DOUBLE, [None, 3])])
+    if rng.random() < 0.3:  # numbers that lie in another file
+        graph.initializer.append(_elsewhere(rng))
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)])
     model.ir_version = 8
     inputs: list[Any] = [
@@ -469,7 +549,7 @@ def onnx_cards(samples: list[bytes], rng: np.random.Generator) -> bytes:
     return onnx.ModelProto.SerializeToString(model)
 
 
-_YAML = (aliases, alias_in_itself, deep_yaml, large_yaml)
+_YAML = (aliases, alias_in_itself, deep_yaml, large_yaml, merge_keys)
 _TEXT = (wide_table, odd_clock)
 BUILDERS: dict[str, tuple[Builder, ...]] = {
     "robot-yaml": _YAML,
@@ -477,14 +557,15 @@ BUILDERS: dict[str, tuple[Builder, ...]] = {
     "robot-urdf": (urdf_chain, urdf_circle, urdf_star, urdf_odd),
     "mapping-card": (card_numbers, card_sizes, deep_json, long_numbers),
     "mapping-card-syda": (card_numbers, card_sizes, long_numbers),
-    "mapping-weights-marked": (other_sizes, other_types, odd_tables),
+    "mapping-weights-marked": (other_sizes, other_types, odd_tables, zero_spreads),
     "agent-card": (deep_stack, deep_json, long_numbers),
     "agent-weights": (other_sizes, other_types, odd_tables),
+    "agent-policy-weights": (zero_spreads, other_sizes),
     "agent-checkpoint": (other_sizes, other_types, odd_tables),
     "agent-onnx": (onnx_cards,),
     "motions-npz": (npz_bomb, npz_shapes),
     "motions-keypoints": (npz_shapes, npz_bomb),
-    "motions-paper": (workbook_elsewhere,),
+    "motions-paper": (workbook_elsewhere, workbook_strings),
     "motions-bvh": (bvh_deep, bvh_header),
     "motions-kinect": _TEXT,
     "motions-openni": _TEXT,

@@ -13,9 +13,11 @@ from fuzz_build import BUILDERS, Builder
 from fuzz_damage import Damage, in_archive, in_bytes, in_json, in_json_lines, in_weights, in_yaml, mixed
 
 import syda_gym
+from syda_gym.agents.agent import BaseAlone
 from syda_gym.agents.bundle import load_agent, save_agent
 from syda_gym.agents.classical.rivals import make_rival
 from syda_gym.agents.interface import Interface
+from syda_gym.agents.learned.policy import ResidualPolicy
 from syda_gym.agents.learned.predictor import Predictor, input_count
 from syda_gym.agents.learned.tcn import TcnShape
 from syda_gym.agents.residual.checkpoint import load_checkpoint
@@ -238,8 +240,12 @@ def agent_targets(folder: Path) -> list[Target]:
     card = save_agent(agent, folder / "agent")
     weights = card.with_suffix(".safetensors")
 
-    def read() -> Any:
-        loaded = load_agent(folder / "agent", interface)
+    policy = save_agent(
+        ResidualPolicy.untrained(interface, BaseAlone(interface), hidden=(4,)), folder / "policy"
+    ).with_suffix(".safetensors")
+
+    def read(name: str = "agent") -> Any:
+        loaded = load_agent(folder / name, interface)
         loaded.reset(1)
         return loaded.act(np.zeros((1, interface.size)))
 
@@ -250,6 +256,13 @@ def agent_targets(folder: Path) -> list[Target]:
     return [
         Target("agent-card", [card.read_bytes()], replacing(card, read), mixed(in_json)),
         Target("agent-weights", [weights.read_bytes()], replacing(weights, read), mixed(in_weights)),
+        Target(
+            "agent-policy-weights",
+            [policy.read_bytes()],
+            replacing(policy, lambda: read("policy")),
+            mixed(in_weights),
+            share=0.5,
+        ),
         Target("agent-checkpoint", [checkpoint_bytes()], read_checkpoint, mixed(in_weights)),
         *onnx_targets(folder),
     ]

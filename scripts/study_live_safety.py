@@ -9,9 +9,11 @@
 ``pairs``: random pairs of free poses; the motion of the live loop goes from one to the other within 5 s at 30 Hz
 (``--progress FOLDER`` keeps each pair's outcome, so that a run goes on where the last one ended).
 ``stops``: stops in random states of the loop. ``wire``: UDP to UDP in real time beside processes that keep the cores
-busy, flood the source with junk and stop the loop's process now and then; speeds and accelerations are taken from the
-kernel's time stamps of the packets. ``people``: how many frames of real recordings are called implausible.
-``unfamiliar``: how many frames of an action are called unfamiliar by a mapping fitted on the same person's others.
+busy, flood the source with junk and stop the loop's process now and then, with an emergency stop every ten seconds or
+so; speeds and accelerations are taken from the kernel's time stamps of the packets. With ``--add`` the figures of a run
+are added to those of earlier ones, so that many commands can be had in pieces. ``people``: how many frames of real
+recordings are called implausible. ``unfamiliar``: how many frames of an action are called unfamiliar by a mapping fitted
+on the same person's others.
 """
 
 from __future__ import annotations
@@ -43,7 +45,7 @@ from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.motions.loading import load_motions
 from syda_gym.teleoperation import LoopSettings, TeleoperationLoop, Tick, UdpSink, UdpSource, run
 from syda_gym.teleoperation.calibration import Calibration
-from syda_gym.teleoperation.incoming.packets import encode_frame
+from syda_gym.teleoperation.incoming.packets import encode_frame, encode_request
 from syda_gym.teleoperation.safety.limiter import CommandLimiter
 from syda_gym.teleoperation.safety.motion import Motion
 from syda_gym.teleoperation.safety.plausibility import Plausibility
@@ -62,6 +64,8 @@ def main() -> None:
     parser.add_argument("--robots", nargs="+", default=["pepper", "nao"])
     parser.add_argument("--rate", type=float, default=60.0, help="of the loop on the wire [Hz]")
     parser.add_argument("--progress", type=Path, help="folder of outcomes of `pairs`; those in it are not run again")
+    parser.add_argument("--seed", type=int, default=0, help="of the person on the wire")
+    parser.add_argument("--add", action="store_true", help="add to the figures of `wire` that are there")
     parser.add_argument("--data", type=Path, help="folder of recordings for `people`")
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
@@ -70,8 +74,25 @@ def main() -> None:
     print(json.dumps(result, indent=2))
     if args.out is not None:
         known = json.loads(args.out.read_text()) if args.out.is_file() else {}
+        if args.add and args.part in known:
+            result = added(known[args.part], result)
         with atomic_path(args.out) as path:
             path.write_text(json.dumps({**known, args.part: result}, indent=2) + "\n")
+
+
+def added(before: dict[str, Any], now: dict[str, Any]) -> dict[str, Any]:
+    """The figures of two runs on the wire together: counts add up, of times and shares the greatest counts."""
+    result = {**now}
+    for name, value in before.items():
+        if isinstance(value, dict):
+            result[name] = added(value, now.get(name, {}))
+        elif name not in now:
+            result[name] = value
+        elif isinstance(value, int):
+            result[name] = value + now[name]
+        else:
+            result[name] = max(value, now[name])
+    return result
 
 
 def pairs(args: argparse.Namespace) -> dict[str, Any]:
@@ -196,7 +217,7 @@ def wire(args: argparse.Namespace) -> dict[str, Any]:
         pipes[1].close()  # so that a receiver that died is noticed
         port = pipes[0].recv()
         others = [context.Process(target=_burn, args=(3 * seconds,)) for _ in range(os.cpu_count() or 1)]
-        others.append(context.Process(target=_send, args=(source.port, args.rate, 3 * seconds)))
+        others.append(context.Process(target=_send, args=(source.port, args.rate, 3 * seconds, args.seed)))
         others.append(context.Process(target=_junk, args=(source.port, 3 * seconds)))
         others.append(context.Process(target=_stall, args=(os.getpid(), 3 * seconds)))
         for process in others:
@@ -204,32 +225,52 @@ def wire(args: argparse.Namespace) -> dict[str, Any]:
         with UdpSink(robot, port=port) as sink:
             while receiver.is_alive() and not pipes[0].poll():
                 run(source, loop, sink, seconds=1.0, rest_at_end=False)
-            stamps, path = pipes[0].recv()
+            stamps, path, states = pipes[0].recv()
         for process in others:
             process.kill()
         receiver.join()
         dropped = dict(source.inbox.dropped)
-    return {**_judge(robot, loop, stamps, path), "dropped": dropped, "load_average": os.getloadavg()[0]}
+    stopped = np.array([state == State.STOPPED.value for state in states])
+    figures = _judge(robot, loop.acceleration, stamps, path, stopped)
+    states = {state: states.count(state) for state in sorted(set(states))}
+    return {
+        "runs": 1,
+        "rate_hz": args.rate,
+        **figures,
+        "states": states,
+        "dropped": dropped,
+        "load_average": os.getloadavg()[0],
+    }
 
 
-def _judge(robot: Robot, loop: TeleoperationLoop, stamps: FloatArray, path: FloatArray) -> dict[str, Any]:
+def _judge(robot: Robot, most: FloatArray, stamps: FloatArray, path: FloatArray, stopped: Any) -> dict[str, Any]:
+    """What the wire saw: poses ``(N, n)`` at times ``(N,)``, and which of them were sent as stopped ``(N,)``."""
     dt = np.diff(stamps)
-    velocity = np.diff(path, axis=0) / dt[:, None]
-    change = np.diff(velocity, axis=0) / (0.5 * (dt[1:] + dt[:-1]))[:, None]
-    faster = np.abs(velocity[1:]) > np.abs(velocity[:-1])
+    step = np.diff(path, axis=0)
+    velocity = step / dt[:, None]
+    change = np.abs(np.diff(velocity, axis=0)) / (0.5 * (dt[1:] + dt[:-1]))[:, None] / most
+    emergency = stopped[2:] & ~stopped[1:-1]  # no limit but the robot's own: not one step further
+    faster = (np.abs(velocity[1:]) > np.abs(velocity[:-1])) & ~emergency[:, None]
+    slower = ~faster & ~emergency[:, None]
     check = SelfCollision(robot)
-    most = loop.acceleration
-    beyond = np.abs(change) > most * 1.02
+    for row, joint in np.argwhere((change > 1.02) & ~emergency[:, None]):
+        share = (velocity[row : row + 2, joint] / robot.speed[joint]).round(3).tolist()
+        around = (1e3 * dt[max(row - 2, 0) : row + 3]).round(2).tolist()
+        print(f"{change[row, joint]:.2f} of the limit at {row}: {share} of a joint's speed, intervals {around} ms")
     return {
         "commands": len(path),
         "limit_violations": int(robot.violations(path, 0.0).sum()),
         "speed_violations": int((np.abs(velocity) > robot.speed * 1.001).sum()),
-        "acceleration_violations_getting_faster": int((beyond & faster).sum()),
-        "acceleration_violations_braking_or_late_packets": int((beyond & ~faster).sum()),
+        "acceleration_violations_getting_faster": int(((change > 1.02) & faster).sum()),
+        "acceleration_violations_braking": int(((change > 1.02) & slower).sum()),
+        "emergency_stops": int(emergency.sum()),
+        "steps_while_stopped": int(step[stopped[1:]].any(axis=1).sum()),
         "greatest_speed_share": float((np.abs(velocity) / robot.speed).max()),
-        "greatest_acceleration_share_getting_faster": float(np.where(faster, np.abs(change) / most, 0.0).max()),
-        "contacts_in_a_sample": sum(check.touches(pose) for pose in path[:: max(1, len(path) // 2000)]),
-        "moved_rad": float(np.abs(np.diff(path, axis=0)).sum()),
+        "greatest_acceleration_share_getting_faster": float(np.where(faster, change, 0.0).max()),
+        "greatest_acceleration_share_braking": float(np.where(slower, change, 0.0).max()),
+        "greatest_acceleration_share_of_an_emergency_stop": float(change[emergency].max(initial=0.0)),
+        "contacts_in_a_sample": sum(check.touches(pose) for pose in path[:: max(1, len(path) // 500)]),
+        "moved_rad": float(np.abs(step).sum()),
         "interval_p50_ms": 1e3 * float(np.median(dt)),
         "interval_p99_ms": 1e3 * float(np.percentile(dt, 99)),
         "interval_max_ms": 1e3 * float(dt.max()),
@@ -239,7 +280,7 @@ def _judge(robot: Robot, loop: TeleoperationLoop, stamps: FloatArray, path: Floa
 def _receive(pipe: Any, count: int) -> None:
     with contextlib.suppress(OSError, AttributeError):
         os.nice(-5)
-    stamps, path, base = list[float](), list[list[float]](), 0
+    stamps, path, states, base = list[float](), list[list[float]](), list[str](), 0
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         sock.bind(("127.0.0.1", 0))
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
@@ -250,13 +291,15 @@ def _receive(pipe: Any, count: int) -> None:
             full, nanoseconds = struct.unpack("ll", extra[0][2][:16])
             base = base or full  # small numbers have finer steps
             stamps.append(full - base + 1e-9 * nanoseconds)
-            path.append(list(json.loads(data)["joints"].values()))
-    pipe.send((np.array(stamps), np.array(path)))
+            content = json.loads(data)
+            path.append(list(content["joints"].values()))
+            states.append(str(content["state"]))
+    pipe.send((np.array(stamps), np.array(path), states))
 
 
-def _send(port: int, rate: float, seconds: float) -> None:
-    """Frames of somebody who throws the arms about, some of them lost, doubled or late."""
-    adult, rng = _adult(), np.random.default_rng(0)
+def _send(port: int, rate: float, seconds: float, seed: int) -> None:
+    """Frames of somebody who throws the arms about, some of them lost, doubled or late; stops, and goes on."""
+    adult, rng = _adult(), np.random.default_rng(seed)
     limbs = rng.normal(size=(2, 2, 3))
     index, end = 0, time.monotonic() + seconds
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
@@ -271,6 +314,11 @@ def _send(port: int, rate: float, seconds: float) -> None:
             for _ in range(int(rng.choice([0, 1, 2], p=[0.1, 0.8, 0.1]))):
                 sock.sendto(packet, ("127.0.0.1", port))
             index += 1
+            for chance, controls in ((0.1, ("stop", "release", "resume")), (1.0, ("resume",))):
+                for control in controls if rng.random() < chance / rate else ():
+                    sock.sendto(encode_request(index, time.monotonic(), control), ("127.0.0.1", port))
+                    index += 1
+                    time.sleep(0.2 if len(controls) > 1 else 0.0)
             time.sleep(float(rng.exponential(0.5) + 0.5) / rate if rng.random() > 0.002 else 0.5)
 
 

@@ -288,11 +288,13 @@ def record(
 ) -> None:
     """Record a pair: the robot plays its motions, a person mimics it, and a data set for `fit` comes out.
 
-    Without `--action` one take of each action is played; without `--sink` a window shows the robot.
+    Without `--action` one take of each action is played; without `--sink` a window shows the robot. SPACE stops the
+    robot at once, `p` holds it and `g` plays the prompt again, `q` or Ctrl-C ends by way of its rest pose.
     """
     from syda_gym.motions import write_dataset
     from syda_gym.motions.recordings import new_recording
     from syda_gym.teleoperation.addresses import make_sink, make_source, read_token
+    from syda_gym.teleoperation.screen import keyboard
     from syda_gym.teleoperation.setup.record_session import RecordingOptions, choose_prompts, record_session
 
     say = console()
@@ -302,7 +304,13 @@ def record(
     token = read_token(token_file)
     listener = make_source(source, leader, token=token, calibration=calibration)
     options = RecordingOptions(calibration=calibration, axes=axes, countdown=countdown)
-    with make_sink(sink or ["window"], clips[0].body, token=token) as shown, listener:  # type: ignore[arg-type]
+    with (
+        make_sink(sink or ["window"], clips[0].body, token=token) as shown,  # type: ignore[arg-type]
+        listener,
+        keyboard(listener.inbox) as keys,
+    ):
+        if keys:
+            say.print("> keys: SPACE emergency stop  p pause  g go on  q quit")
         session = record_session(
             listener, shown, clips, leader, options=options, name=out.name, tell=lambda text: say.print(f"> {text}")
         )

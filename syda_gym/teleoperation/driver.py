@@ -14,6 +14,7 @@ from syda_gym.teleoperation.journal import Journal
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.outgoing.sinks import Sink
+from syda_gym.teleoperation.safety.punctuality import SPACING
 from syda_gym.teleoperation.tick import Decision, State, Tick
 
 __all__ = ["Driver"]
@@ -69,6 +70,27 @@ class Driver:
             self._tell(f"source: {error!r}")
             time.sleep(min(_PAUSE, timeout))
             return Received(None, 0.0, ())
+
+    @property
+    def early(self) -> float:
+        """How long it is until the next command may leave [s]: commands too close together would jerk on the wire."""
+        if self._left is None:
+            return 0.0
+        return self._left + SPACING / self.loop.settings.rate - self.source.clock()
+
+    def spaced(self, received: Received) -> Received:
+        """What came, and what comes until it is time for the next command; an emergency stop does not wait."""
+        end = time.monotonic() + self.early
+        while (received.packet is not None or received.controls) and "stop" not in received.controls:
+            early = end - time.monotonic()
+            if early <= 0.0 or self.source.inbox.closed:
+                break
+            more = self.take(self.source, early)
+            if more.packet is not None and received.packet is not None:
+                self.source.inbox.drop("overtaken")
+            kept = received if more.packet is None else more
+            received = Received(kept.packet, kept.arrived, received.controls + more.controls)
+        return received
 
     def step(self, received: Received) -> Decision:
         """Decides and sends."""

@@ -94,7 +94,7 @@ def _follow(driver: Driver, frames: Anticipation, ending: Ending, seconds: float
     end = None if seconds is None else source.clock() + seconds
     patience = period = 1.0 / driver.loop.settings.rate
     while (end is None or source.clock() < end) and not driver.gone:
-        received = driver.take(frames, patience)
+        received = driver.spaced(driver.take(frames, patience))
         driver.step(received)
         if ending.asked or source.inbox.closed:
             return
@@ -131,7 +131,8 @@ def _listen(driver: Driver, ending: Ending, signals: int, seconds: float) -> lis
         left = end - time.monotonic()
         if left <= 0.0:
             break
-        heard += [control for control in driver.take(driver.source, left).controls if control != "calibrate"]
+        received = driver.spaced(driver.take(driver.source, left)._replace(packet=None))
+        heard += [control for control in received.controls if control != "calibrate"]
     return heard
 
 

@@ -42,6 +42,7 @@ class LoopSettings:
         beta: growth of the cutoff with speed [Hz per rad/s].
         speed: share of the joints' speed limits that may be used.
         acceleration: greatest acceleration of every joint [rad/s^2]; ``None`` for full speed within 0.2 s.
+            0.7 of it are planned with; the rest is for commands that leave late.
         jerk: greatest jerk of every joint [rad/s^3]; ``None`` for no limit. Where the robot must brake to keep clear of
             a limit or of itself, the acceleration counts and the jerk does not.
         ease: share of the speed limits on the way to rest.

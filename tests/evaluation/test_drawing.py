@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from syda_gym.errors import OptionError
+from syda_gym.errors import OptionError, SydaError
 from syda_gym.evaluation.drawing import draw, write_png
 from syda_gym.evaluation.report.figures import Shape, Track, track
 from syda_gym.simulation.pictures.video import write_video
@@ -66,6 +66,21 @@ def test_pictures_and_films_can_be_read_back(embedded, tmp_path):
     about = next(reader)
     assert about["size"] == (160, 120)
     assert sum(1 for _ in reader) == 5
+
+
+def test_a_film_that_cannot_be_written_is_an_error_and_leaves_no_file(embedded, tmp_path, monkeypatch):
+    import imageio_ffmpeg
+
+    def broken(*_, **__):
+        raise OSError(28, "No space left on device")
+        yield
+
+    take = embedded.takes[0]
+    image = draw([track(embedded.bodies["pepper"], take.frames["pepper"])], 0, size=(160, 120), finer=1)
+    monkeypatch.setattr(imageio_ffmpeg, "write_frames", broken)
+    with pytest.raises(SydaError):
+        write_video(tmp_path / "a.mp4", iter([image]), 10.0)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_bad_input_is_named():

@@ -60,3 +60,13 @@ def test_files_keep_the_users_umask(tmp_path, mask):
     finally:
         os.umask(before)
     assert path.stat().st_mode & 0o777 == 0o666 & ~mask
+
+
+def test_a_neighbours_temporary_file_is_left_alone(tmp_path):
+    with atomic_path(tmp_path / "x.txt") as theirs:
+        theirs.write_text("theirs")
+        write_text(tmp_path / "x.txt", "ours")
+        assert theirs.read_text() == "theirs"
+        assert theirs.name.startswith(".x-")
+    assert (tmp_path / "x.txt").read_text() == "theirs"
+    assert [path.name for path in tmp_path.iterdir()] == ["x.txt"]

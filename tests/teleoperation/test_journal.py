@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 import json
+import resource
 from collections.abc import Callable
 from pathlib import Path
 
@@ -122,3 +124,14 @@ def test_a_first_line_with_values_of_other_kinds_is_refused(
     path.write_text(json.dumps(json.loads(path.read_text().splitlines()[0]) | {key: value}) + "\n")
     with pytest.raises(TeleoperationError, match="line 1: "):
         replay_journal(path, mapping)
+
+
+def test_a_compressed_line_without_end_is_no_journal(tmp_path: Path) -> None:
+    path = tmp_path / "bomb.jsonl.gz"
+    with gzip.open(path, "wb", compresslevel=1) as file:
+        for _ in range(256):
+            file.write(bytes(2**20))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(TeleoperationError, match="not a journal"):
+        read_journal(path)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100 << 10, "kilobytes"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -10,6 +11,8 @@ from types import FrameType
 from typing import Any, TypeVar
 
 import numba
+
+from syda_gym.embodiments.limb_ik.keeping import may_keep
 
 __all__ = ["compiled", "copy", "first_call"]
 
@@ -23,14 +26,19 @@ _called: set[Callable[..., Any]] = set()
 def compiled(function: Function) -> Function:
     """Compiles on first use and keeps the code: beside its file, or in the user's cache where that is read-only.
 
+    Nothing is kept in, or read from, a folder in which somebody else could write (``may_keep``): there, every process
+    compiles anew.
+
     What is kept counts as long as the file of the function that Python calls stays as it is. Who edits a function that
     another file's functions call must touch that file too.
     """
     try:
-        made: Function = numba.njit(cache=True, error_model="numpy")(function)
-    except RuntimeError:  # no folder can be written: compile in every process
-        made = numba.njit(error_model="numpy")(function)
-    return made
+        made: Any = numba.njit(cache=True, error_model="numpy")(function)
+        if may_keep(made._cache.cache_path, inspect.getfile(function)):
+            return made  # type: ignore[no-any-return]
+    except RuntimeError:  # no folder can be written
+        pass
+    return numba.njit(error_model="numpy")(function)  # type: ignore[no-any-return]
 
 
 def first_call(function: Callable[..., Any], *arguments: Any) -> Any:

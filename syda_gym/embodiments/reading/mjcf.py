@@ -9,13 +9,15 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from syda_gym.embodiments.reading.cleaning import origin_attributes
-from syda_gym.errors import EmbodimentError, MissingExtraError
+from syda_gym.errors import EmbodimentError
 
 __all__ = ["urdf_of_mjcf"]
 
 
 def urdf_of_mjcf(path: Path) -> bytes:
     """Bodies become links, hinges and slides joints, sites fixed links; meshes become the boxes around them.
+
+    MuJoCo obeys what the file says: call it in a process of its own (``converted_apart``).
 
     Args:
         path: an MJCF, with the meshes that it names.
@@ -24,13 +26,10 @@ def urdf_of_mjcf(path: Path) -> bytes:
         The URDF, as bytes of XML.
 
     Raises:
-        MissingExtraError: MuJoCo is not installed.
         EmbodimentError: MuJoCo cannot compile the file.
     """
-    try:
-        import mujoco
-    except ImportError as error:
-        raise MissingExtraError(f"{path.name} is MJCF, MuJoCo's format, not a URDF; reading MJCF", "mjcf") from error
+    import mujoco
+
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except Exception as error:  # MuJoCo raises ValueError and its own fatal errors

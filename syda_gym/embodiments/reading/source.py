@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from syda_gym.embodiments.reading.mjcf import urdf_of_mjcf
-from syda_gym.errors import EmbodimentError, MissingExtraError
+from syda_gym.embodiments.reading.apart import converted_apart
+from syda_gym.errors import EmbodimentError
 
 __all__ = ["ROBOT_ENDINGS", "read_source"]
 
@@ -42,9 +42,9 @@ def read_source(path: str | Path) -> Any:
         raise EmbodimentError(f"{file} is larger than {_MOST_BYTES >> 20} MB; that is no plain URDF")
     root = _parsed(file, file.read_bytes())
     if root.tag == "mujoco":
-        return _parsed(file, urdf_of_mjcf(file))
+        return _parsed(file, converted_apart("mjcf", file))
     if root.tag == "robot" and _is_xacro(root):
-        return _parsed(file, _expanded(file))
+        return _parsed(file, converted_apart("xacro", file))
     if root.tag != "robot":
         kind = _OTHERS.get(str(root.tag), f"an XML file with the root <{root.tag}>")
         raise EmbodimentError(f"{file} is not a URDF that can be read: it is {kind}; expected a <robot> tree")
@@ -69,16 +69,3 @@ def _is_xacro(root: Any) -> bool:
     if any(isinstance(element.tag, str) and element.tag.startswith(f"{{{_XACRO}}}") for element in root.iter()):
         return True
     return any("${" in str(value) for element in root.iter("joint", "link", "origin") for value in element.values())
-
-
-def _expanded(file: Path) -> bytes:
-    command = f"`xacro {file.name} > {file.name.split('.')[0]}.urdf` expands it"
-    try:
-        from xacrodoc import XacroDoc
-    except ImportError as error:
-        raise MissingExtraError(f"{file.name} is xacro, not yet a URDF ({command}); reading xacro", "xacro") from error
-    try:
-        text: str = XacroDoc.from_file(str(file)).to_urdf_string()
-    except Exception as error:  # xacro raises what its expressions raise
-        raise EmbodimentError(f"{file} is xacro that does not expand: {error}; {command} in a ROS workspace") from error
-    return text.encode()

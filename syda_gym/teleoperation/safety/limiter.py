@@ -24,6 +24,7 @@ UNKNOWN_SPEED = 2.0
 # Keeps the step below speed * dt after the rounding of adding it to the angle and subtracting it again.
 _ROUNDING = 1.0 - 1e-9
 _HALVINGS = 20
+_INSIDE = 1e-12  # rad; so that rounding does not lead out of a coupled limit
 
 
 class CommandLimiter:
@@ -128,9 +129,14 @@ class _Coupled:
         """Lower and upper limit of the joint at an angle of its governor."""
         return coupled_range(governor, self.row.at, self.row.lower, self.row.upper)
 
+    def _inside(self, governor: float) -> tuple[float, float]:
+        low, high = self.range(governor)
+        margin = min(_INSIDE, 0.5 * (high - low))
+        return low + margin, high - margin
+
     def holds(self, q: Sequence[float]) -> bool:
         low, high = self.range(q[self.by])
-        return low - 1e-12 <= q[self.joint] <= high + 1e-12
+        return low <= q[self.joint] <= high
 
     def apply(self, previous: Sequence[float], q: list[float], slack: float) -> None:
         """Moves the joint into its range; if it is too slow for that, holds the governor back.
@@ -141,17 +147,17 @@ class _Coupled:
             slack: how far the joint may move.
         """
         value, governor, before = q[self.joint], q[self.by], previous[self.joint]
-        low, high = self.range(governor)
+        low, high = self._inside(governor)
         inside = min(max(value, low), high)
         if abs(inside - before) > slack:
             start = previous[self.by]
             share, width = 0.0, 1.0
             for _ in range(_HALVINGS):
                 width *= 0.5
-                low, high = self.range(start + (share + width) * (governor - start))
+                low, high = self._inside(start + (share + width) * (governor - start))
                 if abs(min(max(value, low), high) - before) <= slack:
                     share += width
             q[self.by] = start + share * (governor - start)
-            low, high = self.range(q[self.by])
+            low, high = self._inside(q[self.by])
             inside = min(max(value, low), high)
         q[self.joint] = inside

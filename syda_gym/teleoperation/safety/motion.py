@@ -14,12 +14,14 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.teleoperation.safety.detour import Detour
 from syda_gym.teleoperation.safety.limiter import CommandLimiter
 from syda_gym.teleoperation.safety.pace import Pace, braking_speed
+from syda_gym.teleoperation.safety.punctuality import GENTLE
 from syda_gym.teleoperation.safety.self_collision import SelfCollision
 from syda_gym.teleoperation.safety.slide import slide
 
 __all__ = ["Motion", "Moved"]
 
 _STANDING = 1e-9  # rad/s
+_ROUNDING = 1e-9  # rad
 _DAMPING = 8.0  # 1/s; share of a pair's distance by which it may shrink in a second
 _NEAR = 0.08  # m; pairs further apart do not take part in sliding
 _SAME_GOAL = 0.2  # rad; a target that moves less is the same one, with noise
@@ -69,7 +71,7 @@ class Motion:
         self.command = limiter.start(start)
         self._limiter = limiter
         self._collision = collision if collision is not None and collision.available else None
-        self._most = acceleration * (1.0 - 1e-9)
+        self._most = GENTLE * acceleration  # the rest is for commands that leave late
         self._bounds = limiter.bounds(self._most, jerk)
         self._pace = Pace(period, len(start))
         self._now = 0.0
@@ -141,7 +143,7 @@ class Motion:
     def twin(self) -> Motion:
         """A copy whose steps change nothing of this one; it does not look for detours."""
         twin = copy.copy(self)
-        twin._pace, twin._trail = copy.copy(self._pace), self._trail.copy()
+        twin._pace, twin._trail = self._pace.twin(), self._trail.copy()
         twin._search, twin._searching, twin._next_search, twin._way = None, False, math.inf, list(self._way)
         return twin
 
@@ -171,7 +173,9 @@ class Motion:
     def _intend(self, target: FloatArray, factor: float, dt: float) -> FloatArray:
         """Least, greatest and wanted velocity ``(3, n)`` [rad/s], see ``intention``."""
         pace = self._pace
-        state = np.array((self.command, pace.velocity, pace.acceleration, self._drift))
+        state = np.array(
+            (self.command, pace.velocity, pace.acceleration, self._drift, *pace.tempering(self._most)),
+        )
         found: FloatArray = _call("intention", self._bounds, state, target, dt, pace.change, factor)
         return found
 
@@ -182,12 +186,7 @@ class Motion:
 
     def _braked(self) -> FloatArray:
         """The velocity of the first step to a standstill."""
-        velocity, change = self._pace.velocity, self._pace.change
-        if self._in_line:
-            longest = float((np.abs(velocity) / self._most).max())
-            return velocity * max(0.0, 1.0 - change / longest) if longest > 0.0 else velocity
-        slower: FloatArray = np.sign(velocity) * np.maximum(np.abs(velocity) - self._most * change, 0.0)
-        return slower
+        return self._pace.slowed(self._most, alike=self._in_line)
 
     def _try(self, velocity: FloatArray) -> bool:
         """Takes a step if it and the way to a standstill after it are within limits and free."""
@@ -245,7 +244,8 @@ class Motion:
     def _go(self, velocity: FloatArray) -> None:
         end = self._end(velocity)
         if not self._limiter.allows(end):  # rounding at the edge of a coupled limit
-            end = self.command
+            inside = self._limiter.start(end)
+            end = inside if float(np.abs(inside - end).max()) < _ROUNDING else self.command
         self._step = end - self.command
         self._arrive(end)
 

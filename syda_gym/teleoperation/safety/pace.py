@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.teleoperation.safety.punctuality import GENTLE, Punctuality
 
 __all__ = ["Pace", "braking_speed"]
 
 _TINY = 1e-6  # s; commands this close together count as one
 _STALL = 2.0  # periods without a command after which the robot stands still
+_LONGEST = 1.5  # periods; no step is planned for longer
 
 
 class Pace:
@@ -21,15 +25,19 @@ class Pace:
     last command had left: the interval on the wire is never shorter. The velocity of an interval counts for its middle;
     two of them are half of both intervals apart, which is the time in which it may change.
 
+    When exactly a command left is known to lie between two looks at the clock. Getting faster counts from the slowest
+    that the robot may be, getting slower from the fastest.
+
     Args:
         period: of the loop [s].
         joints: number of joints.
 
     Attributes:
-        velocity: of the last command ``(n,)`` [rad/s].
+        velocity: of the last command at the least ``(n,)`` [rad/s]; zero if nothing came for so long that it stands.
         acceleration: of the last command ``(n,)`` [rad/s^2].
         dt: how long the next step may last [s].
         change: how much time the velocity has to change [s].
+        punctuality: how late commands leave.
     """
 
     def __init__(self, period: float, joints: int) -> None:
@@ -38,6 +46,11 @@ class Pace:
         self.acceleration = np.zeros(joints)
         self.dt = 0.0
         self.change = 0.0
+        self.punctuality = Punctuality(period)
+        self._was = np.zeros(joints)  # the velocity of the last command by the wire, even if that was long ago
+        self._faster = 1.0  # how many times faster it may have been
+        self._lasts = 0.0  # how long the next step will last on the wire [s]
+        self._braking = 0.0  # how much time the velocity has to fall [s]
         self._step = np.zeros(joints)  # the last command less the one before
         self._planned = np.zeros(joints)
         self._before: float | None = None  # when the command before the last one had left
@@ -59,24 +72,57 @@ class Pace:
         last = self._last if left is None else min(max(left, self._last), now)
         first = last if leaving is None else min(max(leaving, self._last), last)
         passed = now - last
-        self.dt = min(passed, 1.5 * self._period)
+        if self._first is not None and self.dt > 0.0:
+            self.punctuality.saw(now, self.dt, last - self._first - self.dt, left is not None)
+        self.dt = min(passed, _LONGEST * self._period)
+        # Without a history, as if the robot had stood still for a period.
+        longest = self._period if self._first is None else last - self._first
+        shortest = self._period if self._before is None else max(first - self._before, 0.0)
+        # The slower of what it may have been: getting faster is what harms.
+        self.velocity = self._was = self._step / longest if longest > _TINY else self._planned
+        self._faster = longest / shortest if shortest > _TINY else 1.0
+        self.change = 0.5 * (shortest + self.dt)
+        self._lasts = now - first + self.punctuality.least
+        self._braking = 0.5 * (shortest + self._lasts)
         if passed > _STALL * self._period:  # nothing came for so long that the robot has come to rest
             self.velocity = np.zeros_like(self.velocity)
             self.acceleration = np.zeros_like(self.velocity)
             self.change = self.dt
-        else:
-            # Without a history, as if the robot had stood still for a period.
-            longest = self._period if self._first is None else last - self._first
-            shortest = self._period if self._before is None else first - self._before
-            # The slower of what it may have been: getting faster is what harms.
-            self.velocity = self._step / longest if longest > _TINY else self._planned
-            self.change = 0.5 * (max(shortest, 0.0) + self.dt)
         self._last, self._last_first = last, first
 
     @property
     def idle(self) -> bool:
         """Whether no time has passed in which to move."""
         return self.dt <= _TINY
+
+    def slowed(self, most: FloatArray, alike: bool = False) -> FloatArray:
+        """Velocities ``(n,)`` [rad/s] of a step that gets slower by ``most`` ``(n,)`` [rad/s^2] by what the wire sees.
+
+        The step lasts longer than it was planned for; else that would look like more braking. None is faster than the
+        one before.
+
+        Args:
+            most: deceleration.
+            alike: all joints in proportion, so that a straight line stays one.
+        """
+        speed = self._faster * np.abs(self._was)
+        need = most * self._braking
+        share = (
+            np.maximum(1.0 - need / np.maximum(speed, _TINY), 0.0) * self._faster * self._lasts / max(self.dt, _TINY)
+        )
+        if alike:
+            share = share[np.argmin(need / np.maximum(speed, _TINY))]
+        result: FloatArray = self._was * np.minimum(share, 1.0)
+        return result
+
+    def tempering(self, most: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What a wire that is not punctual leaves of a step: a velocity that it must not fall below, and a greatest speed.
+
+        Below the first, joints ``(n,)`` [rad/s] would brake harder than ``most`` ``(n,)`` [rad/s^2] by what the wire
+        sees. Faster than the second ``(n,)`` [rad/s], a late command would do harm.
+        """
+        slowed = self.slowed(most)
+        return slowed, np.maximum(most / GENTLE * self.punctuality.seconds, np.abs(slowed))
 
     def end(self, now: float, step: FloatArray) -> None:
         """The command was found: the last one plus ``step`` ``(n,)`` [rad]."""
@@ -93,9 +139,15 @@ class Pace:
 
     def rest(self) -> None:
         """The robot has been stopped, or put somewhere: it does not move."""
-        self.velocity = np.zeros_like(self.velocity)
+        self.velocity = self._was = np.zeros_like(self.velocity)
         self.acceleration = np.zeros_like(self.velocity)
         self._step, self._planned = np.zeros_like(self.velocity), np.zeros_like(self.velocity)
+
+    def twin(self) -> Pace:
+        """A copy whose steps change nothing of this one."""
+        twin = copy.copy(self)
+        twin.punctuality = copy.copy(self.punctuality)
+        return twin
 
 
 def braking_speed(distance: FloatArray, most: FloatArray, delay: float | FloatArray) -> FloatArray:

@@ -66,7 +66,7 @@ def intention(bounds, state, target, dt, change, factor):
     """Least and greatest velocity that speed, acceleration and jerk permit, and the wanted one within them ``(3, n)``.
 
     The wanted velocity arrives at the target as soon as possible and does not overshoot it. Rows of ``state``: the last
-    command, its velocity and acceleration, the target's velocity.
+    command, its velocity and acceleration, the target's velocity, and the two of ``Pace.tempering``.
     """
     n = len(target)
     result = np.empty((3, n))
@@ -87,6 +87,14 @@ def intention(bounds, state, target, dt, change, factor):
         high = max(min(high, cap), slowest)
         low = min(max(low, -cap), fastest)
         low, high = min(low, high), max(low, high)
+        slowed, harmless = state[4, j], state[5, j]
+        low, high = max(low, -harmless), min(high, harmless)
+        if slowed > 0.0:
+            low = max(low, slowed)
+            high = max(high, slowed)
+        elif slowed < 0.0:
+            high = min(high, slowed)
+            low = min(low, slowed)
         way = target[j] - command
         reach = _braking(abs(way - drift * dt), most, lag)
         wanted = _clipped(way / dt, drift - reach, drift + reach)

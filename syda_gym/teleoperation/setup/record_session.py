@@ -1,4 +1,4 @@
-"""record_session: the robot plays prompts, a person mimics it, and a paired data set comes out."""
+"""record_session: the robot plays prompts, a person mimics it and can stop it, and a paired data set comes out."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from syda_gym.motions.loading import load_motions
 from syda_gym.motions.pairing.alignment import Alignment, pair_quality, pair_recordings
 from syda_gym.motions.pairing.recorded_session import Session
 from syda_gym.teleoperation.calibration import Calibration, Calibrator
+from syda_gym.teleoperation.ending import Ending
 from syda_gym.teleoperation.incoming.frame_clock import FrameClock
 from syda_gym.teleoperation.incoming.sources import Source
 from syda_gym.teleoperation.outgoing.sinks import Sink
@@ -28,6 +29,7 @@ from syda_gym.teleoperation.tick import Decision, State
 __all__ = ["RecordingOptions", "choose_prompts", "record_session"]
 
 _LEAST = 8  # operator frames without which a prompt counts as missed
+_REPEATS = 5  # how often a stop is sent, for a network that loses packets
 
 
 @dataclass(frozen=True)
@@ -71,8 +73,13 @@ def record_session(
     person's frames are calibrated to ``operator`` and aligned in time with the commands, by the clock first and by
     limb directions then.
 
+    The robot moves, so it obeys meanwhile, within a tick: ``stop`` is an emergency stop and ends the session, ``pause``
+    holds the robot until ``resume`` and plays the prompt again from its beginning, ``rest``, the end of the source and
+    a signal (Ctrl-C, SIGTERM, SIGHUP) end the session by way of the rest pose, a second signal there is a stop. Takes
+    that are complete are kept.
+
     Args:
-        source: delivers the person's frames; started.
+        source: delivers the person's frames and requests; started.
         sink: shows the robot to the person; open.
         prompts: motions of one robot.
         operator: the body that the person counts as.
@@ -92,31 +99,65 @@ def record_session(
     if len(robots) != 1 or not isinstance(prompts[0].body, Robot):
         raise MotionError(f"prompts must be motions of one robot, got {sorted(robots) or 'none'}")
     chosen, say = options or RecordingOptions(), tell or (lambda text: None)
-    stage = _Stage(source, sink, prompts[0].body, operator, chosen)
-    say("stand still with hanging arms")
-    stage.calibrate()
     takes: list[Take] = []
     alignments: dict[str, Alignment] = {}
     left_out: dict[str, str] = {}
-    for number, prompt in enumerate(prompts, start=1):
-        label = f"{prompt.recording}#{number}" if prompt.recording in alignments else prompt.recording
-        say(f"{number} of {len(prompts)}: {prompt.action}, take the robot's pose")
-        stage.approach(prompt.frames[0])
-        say("mimic the robot now")
-        person, robot = stage.play(prompt)
-        say("thank you")
+    why = "no prompt was played"
+    with Ending() as ending:
+        stage = _Stage(source, sink, prompts[0].body, operator, chosen, ending)
         try:
-            takes.append(_paired(person, robot, prompt, label, operator, chosen, alignments))
-        except MotionError as error:
-            left_out[label] = str(error)
-        if source.inbox.closed:
-            break
-    stage.approach(prompts[0].body.rest)
+            say("stand still with hanging arms")
+            stage.calibrate()
+            for number, prompt in enumerate(prompts, start=1):
+                label = f"{prompt.recording}#{number}" if prompt.recording in alignments else prompt.recording
+                person, robot = _played(stage, prompt, f"{number} of {len(prompts)}", say)
+                say("thank you")
+                try:
+                    takes.append(_paired(person, robot, prompt, label, operator, chosen, alignments))
+                except MotionError as error:
+                    left_out[label] = str(error)
+                if source.inbox.closed:
+                    break
+            stage.home()
+        except _Ended:
+            why = "the session was ended"
+            say("the robot goes home")
+            try:
+                stage.home()
+            except _Stopped:
+                say("STOPPED")
+        except _Stopped:
+            why = "the robot was stopped"
+            say("STOPPED")
     if not takes:
-        raise MotionError(f"no usable take: {next(iter(left_out.values()))}")
+        raise MotionError(f"no usable take: {next(iter(left_out.values()), why)}")
     motions = Motions(name, tuple(takes), {operator.name: operator, prompts[0].body.name: prompts[0].body})
     quality = pair_quality(motions.pair(operator.name, prompts[0].body.name), max_lag=chosen.max_lag)
     return Session(motions, alignments, quality, left_out)
+
+
+def _played(stage: _Stage, prompt: MotionClip, number: str, say: Callable[[str], None]) -> tuple[_Track, _Track]:
+    """What the person and the robot did; from the beginning again after a pause."""
+    while True:
+        try:
+            say(f"{number}: {prompt.action}, take the robot's pose")
+            stage.approach(prompt.frames[0])
+            say("mimic the robot now")
+            return stage.play(prompt)
+        except _Again:
+            say("once more from the beginning")
+
+
+class _Again(Exception):  # noqa: N818 - no error
+    """Somebody paused the robot and goes on."""
+
+
+class _Ended(Exception):  # noqa: N818 - no error
+    """Somebody wants to end."""
+
+
+class _Stopped(Exception):  # noqa: N818 - no error
+    """Somebody stopped the robot."""
 
 
 @dataclass
@@ -131,7 +172,13 @@ class _Stage:
     """Moves the robot tick by tick and listens to the person meanwhile."""
 
     def __init__(
-        self, source: Source, sink: Sink, robot: Robot, operator: Embodiment, options: RecordingOptions
+        self,
+        source: Source,
+        sink: Sink,
+        robot: Robot,
+        operator: Embodiment,
+        options: RecordingOptions,
+        ending: Ending,
     ) -> None:
         self.source, self.sink, self.robot, self.options = source, sink, robot, options
         self.operator = operator
@@ -140,6 +187,7 @@ class _Stage:
         where = sink.angles()
         self._command = self._limiter.start(robot.rest if where is None else where)
         self._last = source.clock()
+        self._ending, self._signals = ending, 0
 
     def calibrate(self) -> None:
         calibrator = Calibrator(self.operator, self.options.calibration, self.options.axes)
@@ -147,6 +195,7 @@ class _Stage:
         end = self.source.clock() + self.options.patience
         while self.calibration is None:
             received = self.source.take(0.1)
+            self._obey(received.controls)
             if received.packet is not None and received.packet.frame is not None:
                 stream.advance(received.arrived, received.packet.sent)
                 self.calibration = calibrator.add(stream.time, received.packet.frame)
@@ -163,6 +212,21 @@ class _Stage:
         while (now := self.source.clock()) < end:
             self._send(now, ease.at(now))
             self._listen(now + 1.0 / self.options.rate, None)
+            if self.source.inbox.closed:
+                raise _Ended
+
+    def home(self) -> None:
+        """Goes to rest; whoever pauses there goes on home, a stop is a stop."""
+        self._signals = self._ending.asked
+        while True:
+            self.source.inbox.reopen()
+            try:
+                return self.approach(self.robot.rest)
+            except _Again:
+                pass
+            except _Ended:
+                if self._ending.asked > self._signals:
+                    self._stop()
 
     def play(self, prompt: MotionClip) -> tuple[_Track, _Track]:
         """Plays a prompt at its own speed; returns what the person and the robot did."""
@@ -177,15 +241,16 @@ class _Stage:
             self._listen(now + 1.0 / self.options.rate, person)
         return person, robot
 
-    def _send(self, now: float, wanted: FloatArray) -> None:
+    def _send(self, now: float, wanted: FloatArray, state: State = State.FOLLOWING) -> None:
         self._command = self._limiter.move(self._command, wanted, min(now - self._last, 0.1))
         self._last = now
-        self.sink.send(Decision(now, State.FOLLOWING, self._command))
+        self.sink.send(Decision(now, state, self._command))
 
     def _listen(self, until: float, track: _Track | None) -> None:
         """Takes what arrives until the next command is due."""
         while (left := until - self.source.clock()) > 0.0:
             received = self.source.take(left)
+            self._obey(received.controls)
             if received.packet is None or received.packet.frame is None or self.calibration is None:
                 if self.source.inbox.closed:
                     return
@@ -194,6 +259,42 @@ class _Stage:
             if track is not None and not self.calibration.implausible(frame):
                 track.times.append(received.arrived)
                 track.frames.append(self.calibration.apply(frame))
+
+    def _obey(self, controls: Sequence[str]) -> None:
+        if "stop" in controls:
+            self._stop()
+        if self._ending.asked > self._signals or "rest" in controls:
+            raise _Ended
+        if "pause" in controls:
+            self._hold()
+
+    def _hold(self) -> None:
+        """Stands where the robot is until somebody wants to go on."""
+        while True:
+            now = self.source.clock()
+            self._send(now, self._command, State.PAUSED)
+            while (left := now + 1.0 / self.options.rate - self.source.clock()) > 0.0:
+                controls = self.source.take(left).controls
+                self._obey([control for control in controls if control != "pause"])
+                if self.source.inbox.closed:
+                    raise _Ended
+                if "resume" in controls:
+                    raise _Again
+
+    def _stop(self) -> None:
+        """Emergency stop: first the robot's own, then the command that it stands, more than once."""
+        problem = ""
+        try:
+            self.sink.stop()
+        except Exception as error:  # the command that it stands goes out all the same
+            problem = f"the robot's own stop failed: {error!r}; USE THE ROBOT'S SWITCH"
+        for _ in range(_REPEATS):
+            now = self.source.clock()
+            self._send(now, self._command, State.STOPPED)
+            self.source.take(1.0 / self.options.rate)
+        if problem:
+            raise TeleoperationError(problem)
+        raise _Stopped
 
 
 def _paired(

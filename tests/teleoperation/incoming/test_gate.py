@@ -8,7 +8,7 @@ import multiprocessing
 import os
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -68,6 +68,36 @@ def test_a_connection_that_sends_junk_is_closed(adult: HumanSkeleton) -> None:
                 connection.send("garbage")
                 connection.recv(timeout=PATIENCE)
         assert 100 <= source.inbox.dropped["json"] <= 400
+
+
+@pytest.mark.parametrize("how", ["a frame of 4 EiB", "fragments without end", "a compressed one"])
+def test_a_message_without_end_is_cut_off_and_the_driver_heard(adult: HumanSkeleton, wave: Wave, how: str) -> None:
+    client = pytest.importorskip("websockets.sync.client")
+    exceptions = pytest.importorskip("websockets.exceptions")
+    sent = 0
+
+    def endless() -> Iterator[str]:
+        nonlocal sent
+        while True:
+            sent += 1000
+            yield "x" * 1000
+
+    with WebSocketSource(adult, port=0) as source:
+        address = f"ws://127.0.0.1:{source.port}"
+        with client.connect(address, compression="deflate") as connection:
+            assert connection.protocol.extensions == [], "nothing is unpacked"
+            with pytest.raises(exceptions.ConnectionClosed):  # noqa: PT012 - it comes in time
+                if how == "fragments without end":
+                    connection.send(endless())
+                elif how == "a frame of 4 EiB":
+                    connection.socket.sendall(b"\x81\xff" + (2**62).to_bytes(8, "big") + b"mask" + b"x" * 100)
+                else:  # a bit that says so
+                    connection.socket.sendall(b"\xc1\x85mask" + b"x" * 5)
+                connection.recv(timeout=PATIENCE)
+        assert sent < 50_000_000
+        with client.connect(address) as connection:
+            connection.send(encode_frame(0, 0.0, wave(0.0)).decode())
+            assert source.take(PATIENCE).packet is not None
 
 
 @pytest.mark.parametrize("kind", [UdpSource, WebSocketSource])

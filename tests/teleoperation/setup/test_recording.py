@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +22,7 @@ from syda_gym.teleoperation.incoming.packets import Packet
 from syda_gym.teleoperation.incoming.sources import Source
 from syda_gym.teleoperation.outgoing.sinks import MemorySink
 from syda_gym.teleoperation.setup.record_session import RecordingOptions, record_session
+from syda_gym.teleoperation.tick import Decision, State
 
 QUICK = RecordingOptions(calibration=0.4, countdown=0.2, tail=0.4, max_lag=0.5, patience=3.0, ease=1.0)
 
@@ -32,6 +36,8 @@ class SimulatedInbox(Inbox):
 
     def take(self, timeout: float) -> Received:
         source = self.source
+        if source.asks:
+            return Received(None, 0.0, (source.asks.pop(0),))
         if source.due > source.now + timeout:
             source.now += timeout
             return Received(None, 0.0, ())
@@ -47,6 +53,7 @@ class Mimic(Source):
         super().__init__(body, clock=lambda: self.now)
         self.robot, self.sink, self.lag = robot, sink, lag
         self.now, self.due, self.number = 0.0, 0.0, 0
+        self.asks: list[str] = []
         self.inbox = SimulatedInbox(self)
 
     def frame(self) -> FloatArray:
@@ -124,3 +131,91 @@ def test_a_person_who_leaves_and_nobody_at_all(adult: HumanSkeleton, pepper: Rob
         record_session(source, sink, prompts, adult, options=QUICK)
     with pytest.raises(MotionError, match="motions of one robot"):
         record_session(source, sink, [], adult)
+
+
+class Watched(MemorySink):
+    """Does something after some commands, and remembers its stops."""
+
+    def __init__(self, then: dict[int, Callable[[], object]]) -> None:
+        super().__init__()
+        self.then, self.stops = then, list[int]()
+
+    def send(self, decision: Decision) -> None:
+        super().send(decision)
+        self.then.pop(len(self.decisions), lambda: None)()
+
+    def stop(self) -> None:
+        self.stops.append(len(self.decisions))
+
+
+@pytest.mark.parametrize("moment", [3, 40, 70, 120])  # on the way to a prompt, while it is played, in the second one
+def test_a_person_who_records_can_stop_the_robot_at_once(
+    adult: HumanSkeleton, pepper: Robot, prompts: list[MotionClip], moment: int
+) -> None:
+    sink = Watched({moment: lambda: source.asks.append("stop")})
+    said: list[str] = []
+    with Mimic(adult, pepper, sink) as source:
+        if moment < 100:
+            with pytest.raises(MotionError, match="the robot was stopped"):
+                record_session(source, sink, prompts, adult, options=QUICK, tell=said.append)
+        else:
+            session = record_session(source, sink, prompts, adult, options=QUICK, tell=said.append)
+            assert [take.action for take in session.motions.takes] == ["wave"], "what is complete is kept"
+    path, states = [d.command for d in sink.decisions], [d.state for d in sink.decisions]
+    assert sink.stops == [moment], "before any other command"
+    assert states[moment:] == [State.STOPPED] * len(states[moment:])
+    assert len(states) > moment + 3, "said more than once"
+    assert all((command == path[moment - 1]).all() for command in path[moment:]), "not one step further"
+    assert said[-1] == "STOPPED"
+
+
+def test_a_stop_whose_robot_fails_is_told(adult: HumanSkeleton, pepper: Robot, prompts: list[MotionClip]) -> None:
+    class Deaf(Watched):
+        def stop(self) -> None:
+            raise OSError("no route")
+
+    sink = Deaf({40: lambda: source.asks.append("stop")})
+    with Mimic(adult, pepper, sink) as source, pytest.raises(TeleoperationError, match="USE THE ROBOT'S SWITCH"):
+        record_session(source, sink, prompts, adult, options=QUICK)
+    assert sink.decisions[-1].state is State.STOPPED
+
+
+def test_a_pause_holds_the_robot_and_plays_the_prompt_again(
+    adult: HumanSkeleton, pepper: Robot, prompts: list[MotionClip]
+) -> None:
+    sink = Watched({70: lambda: source.asks.append("pause"), 90: lambda: source.asks.append("resume")})
+    said: list[str] = []
+    with Mimic(adult, pepper, sink) as source:
+        session = record_session(source, sink, prompts, adult, options=QUICK, tell=said.append)
+    held = [d for d in sink.decisions if d.state is State.PAUSED]
+    assert len(held) >= 15
+    assert all((d.command == held[0].command).all() for d in held)
+    assert "once more from the beginning" in said
+    assert [take.action for take in session.motions.takes] == ["wave", "reach"]
+    assert {quality.verdict for quality in session.quality} == {"good"}
+
+
+@pytest.mark.parametrize("how", ["rest", "quit", "signal"])
+def test_the_end_of_a_session_is_the_rest_pose_and_can_be_stopped_on_the_way(
+    adult: HumanSkeleton, pepper: Robot, prompts: list[MotionClip], how: str
+) -> None:
+    def end() -> None:
+        if how == "signal":
+            os.kill(os.getpid(), signal.SIGTERM)
+        elif how == "rest":
+            source.asks.append("rest")
+        else:
+            source.inbox.close()
+
+    for stopped in (False, True):
+        sink = Watched({140: end, **({150: lambda: source.asks.append("stop")} if stopped else {})})
+        with Mimic(adult, pepper, sink) as source:
+            session = record_session(source, sink, prompts, adult, options=QUICK)
+        assert session.motions.takes[0].action == "wave"
+        last = sink.decisions[-1]
+        if stopped:
+            assert sink.stops == [150]
+            assert last.state is State.STOPPED
+        else:
+            assert not sink.stops
+            assert np.abs(last.command - pepper.rest).max() < 1e-3

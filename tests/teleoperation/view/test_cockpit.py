@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import statistics
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,39 @@ class TestButtons:
         cockpit.press(name)
         assert cockpit._source.take(0.0).controls == (name,)
         assert name in CONTROLS
+
+    def test_a_stop_pressed_on_the_page_is_obeyed_within_a_tick(self, tmp_path: Path) -> None:
+        source, pressed, stops = ReplaySource(waving(), repeat=True), list[int](), list[int]()
+
+        class Motors(MemorySink):
+            def stop(self) -> None:
+                stops.append(len(self.decisions))
+
+        sink = Motors()
+        loop = TeleoperationLoop(unfitted(ADULT, PEPPER), LoopSettings(calibration=0.0))
+        cockpit = Cockpit(loop, source, sink, LiveStatistics(), folder=tmp_path)
+
+        def press() -> None:  # as the page's own thread does
+            while len(sink.decisions) < 20:
+                time.sleep(0.005)
+            pressed.append(len(sink.decisions))
+            cockpit.press("stop")
+
+        thread = threading.Thread(target=press)
+        thread.start()
+        with source:
+            run(source, loop, sink, seconds=2.0)
+        thread.join()
+        states = [decision.state for decision in sink.decisions]
+        first = states.index(State.STOPPED)
+        assert first <= pressed[0] + 1, "one command may have been on its way"
+        assert stops[0] <= first, "the robot's own stop comes first"
+        assert set(states[first:]) == {State.STOPPED}
+        assert all(
+            (decision.command == sink.decisions[first - 1].command).all()
+            for decision in sink.decisions
+            if decision.state is State.STOPPED
+        )
 
     def test_every_request_has_a_button(self) -> None:
         assert {button.name for button in BUTTONS} == {*CONTROLS, "record"}

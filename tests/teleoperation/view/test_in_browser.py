@@ -18,9 +18,13 @@ from syda_gym.motions import load_motions
 from syda_gym.teleoperation import LoopSettings, ReplaySource, State, TeleoperationLoop, run
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.outgoing.bullet import BulletSink
+from syda_gym.teleoperation.tick import Decision
 from syda_gym.teleoperation.view.cockpit import Cockpit
 
 pytest.importorskip("viser", reason="SKIPPED LOUDLY: the extra 'view' is not installed")
+
+HISTORY: list[Any] = []
+"""Requests and states of the running loop, in order."""
 
 _PATIENCE = 180.0  # s; a browser that draws in software on a busy machine is slow
 
@@ -60,15 +64,27 @@ def words(browser: Any) -> str:
 
 @pytest.fixture(scope="module")
 def running() -> Iterator[tuple[TeleoperationLoop, Cockpit]]:
-    """Pepper follows a waving adult until the test ends."""
+    """Pepper follows a waving adult until the test ends; what the loop did and was asked for stands in ``HISTORY``."""
     adult, pepper = catalog.get("adult"), catalog.get("pepper")
     clips = [clip for clip in load_motions("embedded").clips("adult") if clip.action == "wave_both"][:1]
     loop = TeleoperationLoop(unfitted(adult, pepper), LoopSettings(calibration=0.0))
     source, sink, stats = ReplaySource(clips, repeat=True), BulletSink(pepper), LiveStatistics()
+    request = source.inbox.request
+
+    def noted(control: str) -> None:
+        HISTORY.append(control)
+        request(control)
+
     with sink, Cockpit(loop, source, sink, stats) as cockpit, source:
+        source.inbox.request = noted  # type: ignore[method-assign]
+
+        def decided(decision: Decision) -> None:
+            HISTORY.append(decision.state)
+            cockpit.update(decision)
+
         thread = threading.Thread(
             target=run, args=(source, loop, sink),
-            kwargs={"statistics": stats, "on_decision": cockpit.update, "rest_at_end": False}, daemon=True,
+            kwargs={"statistics": stats, "on_decision": decided, "rest_at_end": False}, daemon=True,
         )  # fmt: skip
         thread.start()
         yield loop, cockpit
@@ -92,6 +108,8 @@ def test_the_robot_is_seen_to_move_and_the_buttons_reach_the_loop(
 
         press(browser, "EMERGENCY STOP")
         wait_until(lambda: loop.state is State.STOPPED, "the stop to reach the loop")
+        asked = HISTORY.index("stop")
+        assert State.STOPPED in HISTORY[asked : asked + 3], "obeyed within a tick; one may have been on its way"
         wait_until(lambda: "EMERGENCY STOP: press Release" in words(browser), "the page to say so")
         held = loop.command
         press(browser, "Go on")

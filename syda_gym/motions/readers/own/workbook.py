@@ -19,6 +19,9 @@ _MAX_BYTES = 64 * 2**20
 _MAX_ROWS = 100_000
 _MAX_COLUMN_LETTERS = 2  # columns A to ZZ
 _REFERENCE = re.compile(rb"""(?:\br\s*=\s*["']|\bref\s*=\s*["']|(?<=\d):)\s*\$?([A-Za-z]{0,9})\$?(\d{1,12})""")
+_SHARED = re.compile(rb"""\bt\s*=\s*["']s["']""")
+_STRINGS = re.compile(rb"<(?:\w+:)?si[\s/>]")
+_MOST_TEXT = 64 * 2**20  # bytes that shared strings may become when every cell has its own
 _HIDDEN = re.compile(rb"""\b(?:r|ref)\s*=\s*["'][^"'<>]{0,40}&|<!(?:ENTITY|DOCTYPE)""")
 
 
@@ -60,9 +63,9 @@ def _check_extent(path: Path) -> None:
 
     The reader makes every cell from the first to the last one of a sheet, and ends the whole process if it cannot.
     Where sheets are is said by the workbook itself, so every member counts as one: its last cell bounds its size, and
-    all members together are bounded too.
+    all members together are bounded too. The reader also gives every cell its own copy of a string that cells share.
     """
-    cells = 0
+    cells, sharing, strings = 0, 0, 0
     with open_archive(path, "an .xlsx workbook", MotionError, _MAX_BYTES) as archive:
         names = archive.namelist()
         if "xl/workbook.xml" not in names or any(name.endswith(("workbook.bin", "content.xml")) for name in names):
@@ -80,6 +83,11 @@ def _check_extent(path: Path) -> None:
                     cell = (letters + digits)[:40].decode(errors="replace")
                     raise MotionError(f"{path}: cell {cell} lies beyond {_MAX_ROWS} rows; that is no recording")
                 rows, columns = max(rows, int(digits)), max(columns, _column(letters))
+            sharing += len(_SHARED.findall(content))
+            if _STRINGS.search(content):
+                strings = max(strings, len(content))
+            if sharing * strings > _MOST_TEXT:
+                raise MotionError(f"{path}: {sharing} cells share {strings >> 10} kB of text; that is no recording")
             cells += rows * columns
             if cells > BUDGET.cells:
                 raise MotionError(
