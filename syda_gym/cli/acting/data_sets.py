@@ -30,7 +30,7 @@ def export_episodes(
     name: Annotated[
         str,
         typer.Argument(
-            help="Name of the Minari data set, for example `syda/adult-pepper-v0`; or the new folder of the LeRobot one."
+            help="Name of the Minari data set, for example `syda/adult-pepper-v0`; or the LeRobot one's new folder."
         ),
     ],
     kind: Annotated[

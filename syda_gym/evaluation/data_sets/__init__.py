@@ -1,1 +1,1 @@
-"""Data sets for others: episodes of ``SydaTeleop-v0`` in the formats that offline learning reads; nothing here judges them."""
+"""Episodes of ``SydaTeleop-v0`` in the formats that others learn from; nothing here judges them."""

@@ -55,7 +55,7 @@ def export_lerobot(
         StorageError: the folder exists, or it cannot be written.
     """
     try:
-        import pyarrow  # noqa: F401
+        import pyarrow
         import pyarrow.parquet  # noqa: F401
     except ImportError as error:
         raise MissingExtraError("exporting episodes for LeRobot", "data") from error

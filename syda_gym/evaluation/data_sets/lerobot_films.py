@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
@@ -16,11 +17,11 @@ from syda_gym.simulation.pictures.video import write_video
 
 __all__ = ["CAMERAS", "film_episodes"]
 
-_PLAIN = {"ghost": False, "error": False}  # a policy must not see where the robot should be
+_PLAIN = CameraView(ghost=False, error=False)  # a policy must not see where the robot should be
 CAMERAS: Mapping[str, CameraView] = {
-    "front": CameraView(operator=False, **_PLAIN),
-    "side": CameraView(operator=False, yaw=65.0, **_PLAIN),
-    "scene": CameraView(operator=True, **_PLAIN),
+    "front": replace(_PLAIN, operator=False),
+    "side": replace(_PLAIN, operator=False, yaw=65.0),
+    "scene": _PLAIN,
 }
 """Cameras by name: the robot alone from the front or from its left, or operator and robot side by side."""
 

@@ -35,7 +35,9 @@ IMAGES = "observation.images."
 """What the name of a camera's feature begins with."""
 
 _FILES_PER_CHUNK = 1000
-_EPISODES_PER_FILE = 100  # about a megabyte of rows and a few dozen megabytes of film a file; the format allows 100, 500
+_EPISODES_PER_FILE = (
+    100  # about a megabyte of rows and a few dozen megabytes of film a file; the format allows 100, 500
+)
 _DATA_MB, _VIDEO_MB = 100, 500
 
 
