@@ -27,9 +27,7 @@ PRESET = "unfitted"
 _POSES = 64
 
 
-def unfitted(
-    source: str | os.PathLike[str] | Embodiment, target: str | os.PathLike[str] | Embodiment
-) -> CodedMapping:
+def unfitted(source: str | os.PathLike[str] | Embodiment, target: str | os.PathLike[str] | Embodiment) -> CodedMapping:
     """Points one body's limbs as the other's, without any recordings.
 
     Limb directions are taken over as they are in body axes. A robot is decoded by inverse kinematics within its joint
