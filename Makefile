@@ -42,7 +42,7 @@ check: lint types test docs
 
 docs: $(DEVELOPMENT)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
-	@echo "open site/index.html"
+	@echo "open site/index.html; its search wants a server: $(BIN)/python -m http.server --directory site"
 
 wheel: $(DEVELOPMENT)
 	$(BIN)/python -m build --outdir dist

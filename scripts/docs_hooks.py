@@ -1,7 +1,8 @@
 """What ``mkdocs`` runs while it builds the site.
 
-The reference has one page a room and one section a module, found by walking the package. Equations become MathML, so
-that no script is fetched to show them, and a page that would fetch anything else from the network stops the build.
+The reference begins with what a user starts from; then it has one page a room and one section a module, found by
+walking the package. Equations become MathML, so that no script is fetched to show them, and a page that would fetch
+anything else from the network stops the build.
 """
 
 from __future__ import annotations
@@ -31,6 +32,31 @@ ROOMS = {
     "errors": "Errors",
     "files": "Files",
 }
+START = {
+    "From recordings to a mapping": (
+        "mappings.fitting.fit.fit",
+        "mappings.methods.unfitted.unfitted",
+        "motions.loading.load_motions",
+        "mappings.mapping.Mapping",
+        "mappings.storage.save_mapping",
+        "mappings.storage.load_mapping",
+        "embodiments.embodiment.landmark_error",
+    ),
+    "Which way to go": (
+        "routes.routing.best_route",
+        "routes.routing.ranked_routes",
+        "routes.metric.transferability",
+        "routes.suggestion.suggest",
+    ),
+    "The environment: `gym.make`": (
+        "envs.teleop.SydaTeleopEnv",
+        "envs.vector.SydaTeleopVectorEnv",
+    ),
+    "Live": ("routes.piloting.choice.choose_mapping", "teleoperation.session.teleoperate"),
+    "Bodies": ("embodiments.catalog.get", "teleoperation.setup.robot_setup.add_robot"),
+}
+"""What a user starts from, by what it is for."""
+
 _INLINE = re.compile(r'<span class="arithmatex">\\\((.*?)\\\)</span>', re.DOTALL)
 _BLOCK = re.compile(r'<div class="arithmatex">\s*\\\[(.*?)\\\]\s*</div>', re.DOTALL)
 _FETCHED = re.compile(
@@ -40,9 +66,23 @@ _FETCHED = re.compile(
 
 def on_files(files: Files, config: Any) -> Files:
     """Adds the reference pages."""
+    files.append(File.generated(config, "reference/start.md", content=start_page()))
     for room, title in ROOMS.items():
         files.append(File.generated(config, f"reference/{room}.md", content=reference_page(room, title)))
     return files
+
+
+def start_page() -> str:
+    """What most programs use, before the rooms one after the other."""
+    parts = [
+        "# Start here\n\nWhat most programs use. The names without a room are in `syda_gym` itself: `syda_gym.fit`, "
+        "`syda_gym.load_motions` and so on. Every room has a page of its own behind this one.\n"
+    ]
+    for title, names in START.items():
+        parts.append(f"\n## {title}\n")
+        # The rooms' pages own the anchors; here the same text stands a second time.
+        parts += [f"\n::: syda_gym.{name}\n    options:\n      heading_level: 3\n" for name in names]
+    return "".join(parts)
 
 
 def reference_page(room: str, title: str) -> str:

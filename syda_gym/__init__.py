@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from syda_gym.routes.metric import transferability
     from syda_gym.routes.routing import best_route, ranked_routes
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "ENV_ID",

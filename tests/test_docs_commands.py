@@ -30,7 +30,7 @@ PARSED = {
     "syda-gym benchmark examples/paper_benchmark.yaml": "needs the paper's recordings; tests/evaluation",
     "syda-gym compare study other": "needs two benchmarks; tests/evaluation/benchmark",
     "syda-gym suggest adult kid pepper --pair kid:pepper --benchmark": "needs a benchmark; tests/evaluation",
-    "syda-gym export-episodes": "needs the extra data; tests/evaluation/test_minari_export.py",
+    "syda-gym export-episodes": "needs the extra data; tests/evaluation/data_sets",
     "syda-gym reproduce-paper": "needs the paper's recordings; tests/evaluation/paper",
     "syda-gym transferability --validate": "minutes; tests/evaluation/prediction",
     "syda-gym route --operator adult --robot nao": "fits and plays every link; tests/routes/test_measured.py",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,22 +14,29 @@ import pytest
 FOLDER = Path(__file__).resolve().parents[1] / "examples"
 # Script -> arguments that keep it short, and a piece of what it prints.
 RUNS: dict[str, tuple[list[str], str]] = {
-    "make_and_step.py": ([], "mean landmark error"),
-    "random_agent_video.py": (["film.mp4"], "film.mp4: 60 frames"),
-    "fit_your_npz.py": ([], "unseen action"),
-    "chain_by_hand.py": ([], "adult > kid > pepper"),
-    "choose_a_route.py": ([], "record next"),
-    "train_a_residual.py": (["6144"], "residual on unseen actions"),
-    "sb3_from_scratch.py": (["1024"], "after 1024 steps"),
+    "01_camera_to_pepper.py": (["4"], "film: camera_to_pepper.mp4"),
+    "02_your_film.py": ([], "film: your_film.mp4"),
+    "03_your_robot.py": ([], "film: your_robot.mp4"),
+    "04_record_and_fit.py": ([], "error on unseen ones"),
+    "05_which_body_to_pair.py": ([], "picture: which_body.png"),
+    "06_make_and_step.py": ([], "film: make_and_step.mp4"),
+    "07_train_a_residual.py": (["6144"], "residual on unseen actions"),
+    "08_sb3_from_scratch.py": (["1024"], "after 1024 steps"),
+    "09_benchmark_on_ray.py": (["2"], "page: benchmark_on_ray"),
+    "10_export_to_lerobot.py": (["episodes", "2"], "film: episodes"),
     "live_udp.py": (["4"], "median latency"),
-    "new_robot.py": ([], "record next"),
 }
+NEEDS = {"10_export_to_lerobot.py": ("pyarrow", "data")}
 # Needs an environment of its own (RLlib pins another Gymnasium); it is parsed here and was run there.
 APART = {"rllib_from_scratch.py"}
 
 
 def test_every_example_is_tested() -> None:
     assert {path.name for path in FOLDER.glob("*.py")} == {*RUNS, *APART}
+
+
+def test_the_numbered_ones_are_one_to_ten() -> None:
+    assert [path.name[:2] for path in sorted(FOLDER.glob("[0-9]*.py"))] == [f"{number:02}" for number in range(1, 11)]
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
@@ -41,6 +49,9 @@ def test_example_is_short_and_says_how_to_run_it(path: Path) -> None:
 @pytest.mark.parametrize("script", sorted(RUNS))
 def test_example_runs(script: str, tmp_path: Path) -> None:
     arguments, expected = RUNS[script]
+    if script in NEEDS:
+        module, extra = NEEDS[script]
+        pytest.importorskip(module, reason=f"SKIPPED LOUDLY: {script} needs pip install 'syda-gym[{extra}]'")
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg", "SYDA_GYM_HOME": str(tmp_path / "home")}
     result = subprocess.run(
         [sys.executable, FOLDER / script, *arguments],
@@ -53,4 +64,6 @@ def test_example_runs(script: str, tmp_path: Path) -> None:
     )
     assert result.returncode == 0, result.stderr[-3000:]
     assert expected in result.stdout
+    for name in re.findall(r"^(?:film|picture|page|saved): (\S+)$", result.stdout, re.MULTILINE):
+        assert (tmp_path / name).stat().st_size > 1000, f"{name} was promised"
     assert "Traceback" not in result.stderr

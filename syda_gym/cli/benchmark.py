@@ -1,4 +1,4 @@
-"""The commands that compare many chains: ``benchmark``, ``compare``, ``suggest`` and ``export-episodes``."""
+"""The commands that compare many chains: ``benchmark``, ``compare`` and ``suggest``."""
 
 from __future__ import annotations
 
@@ -11,28 +11,18 @@ import typer
 from syda_gym.cli import checks
 from syda_gym.cli.names import FIGURES, ticked
 from syda_gym.cli.options import (
-    AgentOption,
     BodiesArgument,
     CountOption,
-    DisturbancesOption,
     JsonOption,
-    MethodOption,
     MotionsOption,
-    OperatorOption,
     OutFolderOption,
     PairOption,
-    PresetOption,
-    RobotOption,
-    SeedOption,
     WorkersOption,
-    ends_of,
-    mapping_of,
     pairs_of,
-    route_of,
 )
 from syda_gym.cli.shared import console, counted, interruptible, print_json, print_table, say_written, typed_command
 
-__all__ = ["benchmark", "compare", "export_episodes", "suggest"]
+__all__ = ["benchmark", "compare", "suggest"]
 
 
 def benchmark(
@@ -125,52 +115,6 @@ def compare(
         return
     metres = figure in ("landmark_error", "mapping_error", "bound")
     print_table(comparison_table(found, 100.0 if metres else 1.0, "cm" if metres else "", 2 if metres else 4))
-
-
-def export_episodes(
-    name: Annotated[str, typer.Argument(help="Name of the data set, for example `syda/adult-pepper-v0`.")],
-    motions: MotionsOption = "embedded",
-    operator: OperatorOption = None,
-    robot: RobotOption = None,
-    route: Annotated[
-        str,
-        typer.Option(
-            "--route",
-            help="Bodies such as `adult,kid,pepper`; by default straight from operator to robot.",
-            metavar="A,B,C",
-            callback=checks.route,
-        ),
-    ] = "",
-    method: MethodOption = None,
-    preset: PresetOption = None,
-    agent: AgentOption = "base",
-    disturbances: DisturbancesOption = "none",
-    episodes: Annotated[int, typer.Option("--episodes", help="How many episodes; 0 for one a clip.", min=0)] = 0,
-    seed: SeedOption = 0,
-) -> None:
-    """Write episodes as a Minari data set, for offline learning (extra `data`); by default without a chain."""
-    from syda_gym.evaluation.minari_export import export_minari
-
-    bodies = route_of(route) or ends_of(operator, robot)
-    first, last = ends_of(operator, robot, route)
-    if bodies == "auto":
-        raise typer.BadParameter("a data set has one chain; name its bodies", param_hint="'--route'")
-    if (first, last) != (bodies[0], bodies[-1]):
-        raise typer.BadParameter(f"{route} does not lead from {first} to {last}", param_hint="'--route'")
-    named, chosen = mapping_of(method, preset, None)
-    with interruptible("no data set was written; run the command again"):
-        stored = export_minari(
-            name,
-            motions=motions,
-            route=">".join(bodies),
-            method=f"{named}:{chosen}" if chosen else named,
-            agent=agent,
-            disturbance=disturbances,
-            episodes=episodes,
-            seed=seed,
-            command=typed_command(),
-        )
-    say_written(f"{stored.episodes} episodes, {stored.steps} steps", stored.path)
 
 
 def suggest(

@@ -184,7 +184,9 @@ def teleop(
     journal: Annotated[
         Path | None,
         typer.Option(
-            help="Write every decision to this `.jsonl` or `.jsonl.gz`.", callback=checks.ending(".jsonl", ".jsonl.gz")
+            help="Write every decision to this `.jsonl` or `.jsonl.gz`, which replays, or to this `.mcap` for Foxglove "
+            "and Rerun (extra `ros`).",
+            callback=checks.ending(".jsonl", ".jsonl.gz", ".mcap"),
         ),
     ] = None,
     replay_journal: Annotated[

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from syda_gym.cli import benchmark, fit, live, motions, routes, studies
-from syda_gym.cli.acting import agents, tune
+from syda_gym.cli.acting import agents, data_sets, journals, tune
 from syda_gym.cli.shared import Interrupted, console
 from syda_gym.cli.spellings import Program
 from syda_gym.errors import SydaError
@@ -90,6 +90,7 @@ app.command()(live.record)
 app.command()(benchmark.benchmark)
 app.command()(benchmark.compare)
 app.command()(benchmark.suggest)
-app.command("export-episodes")(benchmark.export_episodes)
+app.command("export-episodes")(data_sets.export_episodes)
 app.add_typer(live.robot_app, name="robot")
+app.add_typer(journals.journal_app, name="journal")
 app.add_typer(motions.motions_app, name="motions")

@@ -7,8 +7,10 @@ __all__ = [
     "ALGORITHMS",
     "AXES",
     "BODIES",
+    "CAMERAS",
     "CELLS",
     "CONFIGS",
+    "DATA_SETS",
     "DEFINITIONS",
     "FIGURES",
     "FORMATS",
@@ -117,6 +119,13 @@ FIGURES = (
     "self_collisions", "coverage", "bound", "reward",
 )  # fmt: skip
 """Figures of a benchmark."""
+
+
+DATA_SETS = ("minari", "lerobot")
+"""Formats of exported episodes."""
+
+CAMERAS = ("front", "side", "scene")
+"""Cameras that film exported episodes."""
 
 
 def ticked(names: tuple[str, ...]) -> str:

@@ -10,7 +10,7 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import TeleoperationError
 from syda_gym.teleoperation.incoming.inbox import Received
 from syda_gym.teleoperation.incoming.sources import Source
-from syda_gym.teleoperation.journal import Journal
+from syda_gym.teleoperation.journal import Record
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.outgoing.sinks import Sink
@@ -47,7 +47,7 @@ class Driver:
         source: Source,
         loop: TeleoperationLoop,
         sink: Sink,
-        journal: Journal | None,
+        journal: Record | None,
         stats: LiveStatistics,
         on_decision: Callable[[Decision], None] | None,
     ) -> None:

@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Protocol
 
 import numpy as np
 
@@ -22,11 +22,30 @@ from syda_gym.mappings.mapping import Mapping
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.tick import Decision, LoopSettings, State, Tick
 
-__all__ = ["FORMAT", "Journal", "JournalLines", "ReplayReport", "read_journal", "replay_journal"]
+__all__ = ["FORMAT", "Journal", "JournalLines", "Record", "ReplayReport", "read_journal", "replay_journal"]
 
 FORMAT = "syda-gym teleoperation journal 2"
 _MAX_LINE = 1 << 20
 _EVERY = 1.0  # s between two marks
+
+
+class Record(Protocol):
+    """What a run may be written to, decision by decision."""
+
+    def decided(self, tick: Tick, decision: Decision) -> None:
+        """Writes one tick and its decision."""
+
+    def dropped(self, now: float, counts: dict[str, int]) -> None:
+        """Writes how many packets have been dropped by ``now``, by reason."""
+
+    def flush(self) -> None:
+        """Hands everything to the operating system."""
+
+    def close(self) -> None:
+        """Ends the file; harmless when repeated, or after ``abandon``."""
+
+    def abandon(self) -> None:
+        """Lets go of the file as it is, after an error."""
 
 
 class Journal:

@@ -11,7 +11,7 @@ from syda_gym.teleoperation.ending import Ending
 from syda_gym.teleoperation.incoming.anticipation import Anticipation
 from syda_gym.teleoperation.incoming.inbox import Received
 from syda_gym.teleoperation.incoming.sources import Source
-from syda_gym.teleoperation.journal import Journal
+from syda_gym.teleoperation.journal import Record
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.outgoing.sinks import Sink
@@ -30,7 +30,7 @@ def run(
     loop: TeleoperationLoop,
     sink: Sink,
     *,
-    journal: Journal | None = None,
+    journal: Record | None = None,
     statistics: LiveStatistics | None = None,
     on_decision: Callable[[Decision], None] | None = None,
     seconds: float | None = None,

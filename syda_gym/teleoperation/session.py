@@ -13,7 +13,7 @@ from syda_gym.mappings.mapping import Mapping
 from syda_gym.motions.how_to_read import AS_IT_STANDS, HowToRead
 from syda_gym.teleoperation.addresses import make_sink, make_source
 from syda_gym.teleoperation.incoming.sources import Source
-from syda_gym.teleoperation.journal import Journal
+from syda_gym.teleoperation.journal import Journal, Record
 from syda_gym.teleoperation.live_run import run
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
@@ -66,7 +66,7 @@ def teleoperate(
         origins: web pages that may connect to a WebSocket.
         model: file of the pose model of cameras and films; ``None`` for the default place.
         how: what a person says about the recording of a replay.
-        journal: file to write every decision to.
+        journal: file to write every decision to; one that ends in ``.mcap`` is for looking at it, any other replays.
         note: free facts for the journal.
         seconds: when to end.
         on_start: called once everything is there and before frames flow.
@@ -98,7 +98,7 @@ def teleoperate(
         start = sink.angles()
         loop = probe if start is None else TeleoperationLoop(mapping, chosen, start)
         _show_operator(sink, loop)
-        written = None if journal is None else Journal(Path(journal), loop, note)
+        written = None if journal is None else _record(Path(journal), loop, note)
         stats = LiveStatistics()
         try:
             if on_start is not None:
@@ -113,6 +113,15 @@ def teleoperate(
                     written.close()
                 except TeleoperationError as error:  # the robot is home; the check of the journal will tell too
                     loop.notices.append(str(error))
+
+
+def _record(path: Path, loop: TeleoperationLoop, note: dict[str, Any] | None) -> Record:
+    if path.suffix != ".mcap":
+        return Journal(path, loop, note)
+    from syda_gym.teleoperation.bags.mcap_journal import McapJournal
+
+    written: Record = McapJournal.of(path, loop, note)
+    return written
 
 
 def _show_operator(sink: Sink, loop: TeleoperationLoop) -> None:

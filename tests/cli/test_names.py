@@ -9,6 +9,7 @@ from syda_gym.cli import names
 from syda_gym.embodiments import catalog
 from syda_gym.envs.task.disturbances import CELLS, LEVELS, PRESETS
 from syda_gym.envs.task.options import REFERENCES
+from syda_gym.evaluation.data_sets.lerobot_films import CAMERAS
 from syda_gym.evaluation.episodes import FIGURES
 from syda_gym.mappings.fitting.fit import METHODS
 from syda_gym.motions.clip import PROTOCOLS
@@ -38,6 +39,7 @@ def test_methods_and_presets_in_their_order():
 
 def test_everything_else():
     assert tuple(FORMATS) == names.FORMATS
+    assert tuple(CAMERAS) == names.CAMERAS
     assert tuple(CELLS) == names.CELLS
     assert names.LEVELS == LEVELS
     assert tuple(PRESETS) == names.SINGLE_DISTURBANCES

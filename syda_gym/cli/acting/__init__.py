@@ -1,1 +1,1 @@
-"""The commands that train, tune, compare, film and export agents, and the options that they share; no other command."""
+"""Commands that deal with agents and with what runs leave behind."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 
+from syda_gym.embodiments.catalog import resolve
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
@@ -24,7 +27,7 @@ PRESET = "unfitted"
 _POSES = 64
 
 
-def unfitted(source: Embodiment, target: Embodiment) -> CodedMapping:
+def unfitted(source: str | os.PathLike[str] | Embodiment, target: str | os.PathLike[str] | Embodiment) -> CodedMapping:
     """Points one body's limbs as the other's, without any recordings.
 
     Limb directions are taken over as they are in body axes. A robot is decoded by inverse kinematics within its joint
@@ -32,8 +35,8 @@ def unfitted(source: Embodiment, target: Embodiment) -> CodedMapping:
     unfamiliar, and knows no error bound.
 
     Args:
-        source: who leads.
-        target: who follows.
+        source: who leads: a body, its name, or the path of a robot's description.
+        target: who follows, likewise.
 
     Returns:
         The mapping; its card says ``geometric``, ``unfitted``.
@@ -43,10 +46,11 @@ def unfitted(source: Embodiment, target: Embodiment) -> CodedMapping:
 
     Example:
         >>> import syda_gym
-        >>> adult, pepper = syda_gym.embodiment("adult"), syda_gym.embodiment("pepper")
-        >>> syda_gym.unfitted(adult, pepper)(adult.standing()).shape
+        >>> adult = syda_gym.embodiment("adult")
+        >>> syda_gym.unfitted(adult, "pepper")(adult.standing()).shape
         (10,)
     """
+    source, target = resolve(source), resolve(target)
     if source == target:
         raise EmbodimentError(f"{source.name!r} cannot drive itself; name two bodies")
     for body, role in ((source, "drive"), (target, "be driven")):

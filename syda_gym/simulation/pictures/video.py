@@ -16,7 +16,9 @@ from syda_gym.files import atomic_path
 __all__ = ["write_video"]
 
 
-def write_video(path: str | os.PathLike[str], pictures: Iterable[ArrayLike], fps: float = 30.0) -> Path:
+def write_video(
+    path: str | os.PathLike[str], pictures: Iterable[ArrayLike], fps: float = 30.0, *, key_frame_every: int = 0
+) -> Path:
     """Writes an H.264 video that any browser plays.
 
     Args:
@@ -24,6 +26,8 @@ def write_video(path: str | os.PathLike[str], pictures: Iterable[ArrayLike], fps
         pictures: ``(height, width, 3)`` uint8 each, all of one size; odd sizes are cropped by one pixel, which H.264
             asks for.
         fps: pictures per second.
+        key_frame_every: a picture of its own at least every so many, for those who jump about in the film; 0 leaves it
+            to the encoder, whose film is smaller.
 
     Returns:
         The path.
@@ -51,7 +55,9 @@ def write_video(path: str | os.PathLike[str], pictures: Iterable[ArrayLike], fps
             quality=8,
             macro_block_size=2,
             ffmpeg_log_level="error",
-            output_params=["-movflags", "+faststart"],  # a browser can start before it has the whole file
+            # A browser can start before it has the whole file; pictures that wait for later ones would shift the rest.
+            output_params=["-movflags", "+faststart"]
+            + (["-g", str(key_frame_every), "-bf", "0"] if key_frame_every else []),
         )
         try:
             writer.send(None)

@@ -22,21 +22,21 @@ from syda_gym.files import read_arrays
 __all__ = ["arrays_from_child"]
 
 _SECONDS = 60.0  # on the wall; the child ends itself after 20 s of processor time
-_MISSING, _REFUSED = 3, 4  # exit codes that the scripts use
+_MISSING, _REFUSED = 3, 4  # exit codes of ``in_child``
 
 
 def arrays_from_child(script: str, path: Path, feature: str, extra: str, library: str) -> dict[str, NDArray[Any]]:
-    """Runs one of the scripts beside this file on a recording.
+    """Runs one of the openers beside this file on a recording.
 
     Args:
         script: ``open_c3d`` or ``open_bag``.
         path: the recording.
         feature: for the message if the library is not installed.
         extra: of this package that installs it.
-        library: that the script needs.
+        library: that the opener needs.
 
     Returns:
-        What the script found, by name.
+        What the opener found, by name.
 
     Raises:
         MissingExtraError: the library is not installed.
@@ -46,7 +46,14 @@ def arrays_from_child(script: str, path: Path, feature: str, extra: str, library
         raise MissingExtraError(feature, extra)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "found.npz"
-        command = [sys.executable, "-P", str(Path(__file__).with_name(f"{script}.py")), str(path.resolve()), str(out)]
+        command = [
+            sys.executable,
+            "-P",
+            str(Path(__file__).with_name("in_child.py")),
+            script,
+            str(path.resolve()),
+            str(out),
+        ]
         try:
             done = subprocess.run(command, capture_output=True, timeout=_SECONDS, check=False)
         except subprocess.TimeoutExpired as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -58,9 +59,9 @@ def test_damaged_c3d_ends_nothing_but_its_own_process(tmp_path: Path) -> None:
 
 def test_without_the_library_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = _c3d(tmp_path / "walk.c3d")
-    (tmp_path / "missing.py").write_text("import sys\nsys.exit(3)\n")
+    shutil.copy(Path(child.__file__).with_name("in_child.py"), tmp_path)
+    (tmp_path / "open_c3d.py").write_text("import a_library_that_is_not_installed\n")
     monkeypatch.setattr(child, "__file__", str(tmp_path / "child.py"))
-    (tmp_path / "open_c3d.py").write_text("import sys\nsys.exit(3)\n")
     with pytest.raises(MissingExtraError, match=r"syda-gym\[c3d\]"):
         load_motions(path)
 

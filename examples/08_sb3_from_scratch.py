@@ -1,6 +1,6 @@
 """Train a policy with plain Stable-Baselines3 PPO, without our trainer, and judge it on actions that it has not seen.
 
-    python examples/sb3_from_scratch.py [STEPS]
+    python examples/08_sb3_from_scratch.py [STEPS]
 
 The hyper-parameters work (a gamma of 0.99 does not): a million steps take minutes; a short run shows the way only.
 J is landmark error [mm] + 0.05 x joint error [mrad] + jitter; the base is the mapping's command, an action of zero.

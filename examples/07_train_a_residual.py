@@ -1,6 +1,6 @@
 """Train a predictor and a residual policy on it, and judge them beside the others on actions that they have not seen.
 
-    python examples/train_a_residual.py [STEPS]
+    python examples/07_train_a_residual.py [STEPS]
 
 The link is noisy and the motors lag. All learn in the fast motor model and are judged in Bullet. A short run shows the
 way, not what can be reached: syda-gym train and the page on agents do it in earnest.

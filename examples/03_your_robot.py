@@ -1,6 +1,6 @@
 """Add a robot from its URDF and move it at once, without recordings: the limbs point as the person's do.
 
-    python examples/new_robot.py [URDF]
+    python examples/03_your_robot.py [URDF]
 
 The description and a picture go to $SYDA_GYM_HOME/robots (by default ~/.syda_gym/robots). Without an argument NAO's
 URDF plays the unknown robot.
@@ -8,30 +8,27 @@ URDF plays the unknown robot.
 
 import sys
 
-import numpy as np
-
 import syda_gym
 from syda_gym.files import asset
 from syda_gym.routes.piloting.choice import choose_mapping
-from syda_gym.routes.suggestion import suggest
+from syda_gym.simulation.pictures.camera import Camera, CameraView
+from syda_gym.simulation.pictures.video import write_video
 from syda_gym.teleoperation.setup.robot_setup import add_robot
 
 urdf = sys.argv[1] if len(sys.argv) > 1 else asset("robots", "nao.urdf")
 added = add_robot(urdf, "newcomer", replace_existing=True)
-robot = added.robot
+robot, verdict = added.robot, added.verdict
 print(f"{robot!r}")
-print(f"description {added.description.name}, picture {added.picture.name}")
+print(f"{verdict.word}: can point its limbs within {57.3 * verdict.error:.1f} degrees of a person's {verdict.reason}")
+print(f"description {added.description}\npicture {added.picture}")
 for notice in added.notices:
     print("check:", notice)
 
 mapping, notices = choose_mapping("adult", "newcomer")
 print(*notices, sep="\n")
-clip = syda_gym.load_motions("embedded").clips("adult")[0]
+clip = next(clip for clip in syda_gym.load_motions("embedded").clips("adult") if clip.action == "wave_high")
 commands = mapping.sequence(clip.frames, clip.fps)
-person = np.diff(clip.body.arm_points(clip.frames), axis=2)
-moved = np.diff(robot.arm_points(commands), axis=2)
-cosine = np.sum(person * moved, axis=-1) / (np.linalg.norm(person, axis=-1) * np.linalg.norm(moved, axis=-1))
-print(f"{clip.action}: limbs within {np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean():.1f} degrees of the person's")
-
-best = suggest(["adult", "kid", "pepper", "newcomer"], [("adult", "pepper"), ("kid", "pepper")])[0]
-print(f"record next: {' and '.join(best.pair)}")
+with Camera(robot, clip.body, CameraView(error=False, ghost=False)) as camera:
+    pictures = [camera.picture(q, operator=frame) for q, frame in zip(commands, clip.frames, strict=True)]
+write_video("your_robot.mp4", pictures, fps=clip.fps)
+print("film: your_robot.mp4")

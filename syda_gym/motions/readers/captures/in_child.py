@@ -1,0 +1,47 @@
+"""A script, run in a process of its own: opens a recording with limits (``in_child.py open_c3d FILE OUT.npz``).
+
+It stands alone: what it runs is a file beside it with a function ``arrays(path)``, and the exit code says how it went.
+"""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+__all__: list[str] = []
+
+_MISSING, _REFUSED = 3, 4  # ``child`` knows these codes
+
+
+def _limit() -> None:
+    """At most 20 s of processor time and 4 GB of addresses."""
+    try:
+        import resource
+    except ImportError:  # there is none outside of Unix
+        return
+    resource.setrlimit(resource.RLIMIT_CPU, (20, 20))
+    resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _main(script: str, path: str, out: str) -> int:
+    _limit()
+    spec = importlib.util.spec_from_file_location(script, Path(__file__).with_name(f"{script}.py"))
+    if spec is None or spec.loader is None:
+        return _REFUSED
+    opener = importlib.util.module_from_spec(spec)
+    try:
+        import numpy as np
+
+        spec.loader.exec_module(opener)  # imports the library that opens
+    except ImportError:
+        return _MISSING
+    try:
+        np.savez(out, **opener.arrays(Path(path)))
+    except Exception as error:  # whatever the library raises is said in one line
+        print(str(error).splitlines()[0] if str(error) else type(error).__name__, file=sys.stderr)
+        return _REFUSED
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main(*sys.argv[1:4]))
