@@ -1,7 +1,7 @@
 """Processes: workers that are spawned, follow their parent into its end, and are never left behind.
 
-They are spawned rather than forked, since PyBullet clients and the threads of numerical libraries do not survive a fork.
-So a script that starts some must guard what it does by ``if __name__ == "__main__":``, as for any such process.
+They are spawned rather than forked, since PyBullet clients and the threads of numerical libraries do not survive a
+fork. So a script that starts some must guard what it does by ``if __name__ == "__main__":``, as for any such process.
 """
 
 from __future__ import annotations

@@ -436,7 +436,7 @@ class Fleet:
             error = float(self._error_sum[index]) / frames
             lived = not bool(self.terminated[index])
             self._success = self._success.copy()
-            self._success[index] = lived and error <= self.options.success_error
+            self._success[index] = lived and error <= self.repertoire.success_error
             ending = Ending(index, int(self.clip[index]), int(self._start[index]), frames, error)
             self.ended.append(ending)
             self._starts.learn(*ending[1:])

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.envs.face import Face
+from syda_gym.envs.family import MAX_STEPS, warn_if_cut
 from syda_gym.envs.fleet import EpisodeWish, Fleet
 from syda_gym.envs.rendering import Painter
 from syda_gym.envs.spaces import action_from_command, action_space, one_info, wishes
@@ -86,6 +87,8 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         self.num_envs = int(num_envs)
         self.render_mode = render_mode
         self._fleet = _fleet(self.options, self.num_envs, max_episode_steps, int(workers))
+        if max_episode_steps == MAX_STEPS:
+            warn_if_cut(self._fleet.repertoire.longest)
         self.metadata = {
             "render_modes": ["rgb_array"],
             "render_fps": round(self._fleet.rates.control_hz),

@@ -13,12 +13,10 @@ depend on which pool it was. Three promises hold for all of them:
 from __future__ import annotations
 
 import os
-import signal
 import time
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -93,7 +93,7 @@ def speed_violations(robot: Robot, frames: ArrayLike, fps: float) -> NDArray[np.
 
 
 def _limit_clips(robot: Robot, clips: FloatArray, fps: float) -> None:
-    """``step_towards`` from frame to frame of clips ``(B, N, n)``, in place; compiled, as it is called at every reset."""
+    """``step_towards`` from frame to frame of clips ``(B, N, n)``, in place; compiled, for resets wait for it."""
     from syda_gym.embodiments.limb_ik.compiling import first_call
     from syda_gym.mappings.limit_kernel import limit_clips
 

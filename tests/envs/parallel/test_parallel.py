@@ -81,7 +81,9 @@ def test_what_was_handed_out_stays_and_pictures_are_the_same(cheap):
             kept = observations.copy(), infos["q"].copy(), infos["motion"].copy()
             env.step(np.ones((3, 10), np.float32))
             env.reset(options={"reset_mask": np.array([True, False, False])})
-            assert all(np.array_equal(a, b) for a, b in zip(kept, (observations, infos["q"], infos["motion"])))
+            assert all(
+                np.array_equal(a, b) for a, b in zip(kept, (observations, infos["q"], infos["motion"]), strict=True)
+            )
         for left, right in zip(one.render(), two.render(), strict=True):
             assert np.array_equal(left, right)
     finally:
