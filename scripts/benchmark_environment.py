@@ -12,22 +12,25 @@ import argparse
 import json
 import os
 import platform
+import re
 import statistics
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import gymnasium
 import numpy as np
 
-from syda_gym.files import write_json
+from syda_gym.files import write_json, write_text
 
 OPTIONS: dict[str, Any] = {"route": ("adult", "pepper")}
 RATES = {"240 Hz, 8 substeps": 240.0, "60 Hz, 2 substeps": 60.0}
 STEPS = 60
+MARKER = "<!-- numbers: docs/results/environment.json -->"
 BARS: dict[str, Any] = {
     "single": {"240 Hz, 8 substeps": 0.95, "60 Hz, 2 substeps": 0.85},
     "sixteen": {"240 Hz, 8 substeps": 0.90, "60 Hz, 2 substeps": 0.90},
@@ -400,17 +403,40 @@ def table(result: dict[str, Any]) -> str:
         else:
             rows.append((peer, values, ""))
     lines = ["| " + " | ".join(row) + " |" for row in rows]
-    return "\n".join([lines[0], "|---|---|---|", *lines[1:]])
+    missed = [what for what, measured, bar in rows[1:] if bar and _missed(what, float(measured), float(bar))]
+    said = f"Missed: {'; '.join(missed)}." if missed else "No bar is missed."
+    return "\n".join([lines[0], "|---|---|---|", *lines[1:], "", said])
+
+
+def _missed(what: str, measured: float, bar: float) -> bool:
+    """Whether a figure is on the wrong side of its bar; of times, costs and memory less is better."""
+    less = what.startswith(("reset", "picture", "memory")) or "cost of a step" in what
+    return measured > bar if less else measured < bar
+
+
+def write_page(page: Path, content: str) -> None:
+    """Puts table and verdict where the page has those of the run before, and drops the note on an older release."""
+    text = page.read_text(encoding="utf-8")
+    text = re.sub(r"\*Measured with the first release[^\n]*\n\n", "", text)
+    pattern = re.escape(MARKER) + r"\n\n(?:\|[^\n]*\n)+\n[^\n]*\n"
+    text, count = re.subn(pattern, lambda _: f"{MARKER}\n\n{content}\n", text)
+    if count != 1:
+        raise SystemExit(f"{page}: expected one table with its verdict below {MARKER!r}, found {count}")
+    write_text(page, text)
 
 
 def main() -> None:
     """Measures, prints the table, writes the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", help="JSON file for all figures")
+    parser.add_argument("--page", type=Path, help="Markdown page whose table is replaced")
     parser.add_argument("--quick", action="store_true", help="few repeats, no memory measurements")
     arguments = parser.parse_args()
     result = measure(arguments.quick)
-    print(table(result))
+    content = table(result)
+    print(content)
+    if arguments.page:
+        write_page(arguments.page, content)
     if arguments.out:
         write_json(arguments.out, result)
     else:
