@@ -40,9 +40,8 @@ def same(one, two):
 @pytest.mark.parametrize(
     ("mode", "changes"),
     [
-        ("next_step", {"disturbances": "teleop:full:train", "start": "uniform", "preview": 1, "history": 2, **FAST}),
-        ("same_step", {"start": "failures", "terminate_error": 0.08, "route": "sample", **FAST}),
-        ("next_step", {"start": "failures", "terminate_error": 0.08, **FAST}),
+        ("same_step", {"disturbances": "teleop:full:train", "start": "uniform", "preview": 1, "history": 2, **FAST}),
+        ("next_step", {"start": "failures", "terminate_error": 0.08, "route": "sample", **FAST}),
         ("disabled", {"self_collision": True, "reward": {"contacts": 0.1}, "max_episode_steps": 20}),
     ],
     ids=lambda value: str(value)[:40],
@@ -53,7 +52,7 @@ def test_two_processes_give_the_bits_of_one(cheap, mode, changes):
     try:
         same(one.reset(seed=3), two.reset(seed=3))
         rng, ends = np.random.default_rng(0), 0
-        for _ in range(45 if mode == "disabled" else 260):
+        for _ in range(45 if mode == "disabled" else 200):
             actions = rng.uniform(-1, 1, (COUNT, 10)).astype(np.float32)
             left, right = one.step(actions), two.step(actions)
             same(left, right)
@@ -74,7 +73,7 @@ def test_two_processes_give_the_bits_of_one(cheap, mode, changes):
 
 def test_what_was_handed_out_stays_and_pictures_are_the_same(cheap):
     options = {**cheap, **FAST, "render_mode": "rgb_array", "camera": {"width": 32, "height": 32}}
-    one, two = (SydaTeleopVectorEnv(3, workers=workers, **options) for workers in (1, 3))
+    one, two = (SydaTeleopVectorEnv(3, workers=workers, **options) for workers in (1, 2))
     try:
         for env in (one, two):
             observations, infos = env.reset(seed=0)
