@@ -12,22 +12,25 @@ import argparse
 import json
 import os
 import platform
+import re
 import statistics
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import gymnasium
 import numpy as np
 
-from syda_gym.files import write_json
+from syda_gym.files import write_json, write_text
 
 OPTIONS: dict[str, Any] = {"route": ("adult", "pepper")}
 RATES = {"240 Hz, 8 substeps": 240.0, "60 Hz, 2 substeps": 60.0}
 STEPS = 60
+MARKER = "<!-- numbers: docs/results/environment.json -->"
 BARS: dict[str, Any] = {
     "single": {"240 Hz, 8 substeps": 0.95, "60 Hz, 2 substeps": 0.85},
     "sixteen": {"240 Hz, 8 substeps": 0.90, "60 Hz, 2 substeps": 0.90},
@@ -171,6 +174,51 @@ def servo_vector(count: int, repeats: int) -> dict[str, float]:
     return {"step_us": 1e6 * step, "steps_per_s": count / step, "times_raw": statistics.median(ratios)}
 
 
+def disturbed_vector(count: int, repeats: int) -> dict[str, float]:
+    """Seconds of a step of the servo model with disturbances, resets included, in seconds of one without, in turns."""
+    made = [
+        gymnasium.make_vec("SydaTeleop-v0", num_envs=count, physics="servo", start=start, disturbances=disturbances)
+        for start in ("first", "uniform")
+        for disturbances in (None, "teleop:full:train")
+    ]
+    actions = np.zeros((count, 10), dtype=np.float32)
+    for env in made:
+        env.reset(seed=0)
+        for _ in range(180):  # until the robots are at different places of their clips
+            env.step(actions)
+    spent = np.array(
+        [[cpu(lambda env=env: [env.step(actions) for _ in range(150)]) for env in made] for _ in range(repeats)]
+    )
+    for env in made:
+        env.close()
+    first, uniform = np.median(spent[:, 1] / spent[:, 0]), np.median(spent[:, 3] / spent[:, 2])
+    return {"whole_clips": float(first), "uniform_starts": float(uniform)}
+
+
+def with_workers(count: int, physics: str, workers: int, repeats: int) -> dict[str, float]:
+    """Wall-clock time of a step in one process over that in several, in turns: above 1 the processes are faster."""
+    made = [
+        gymnasium.make_vec("SydaTeleop-v0", num_envs=count, physics=physics, workers=number, **OPTIONS)
+        for number in (1, workers)
+    ]
+    actions, ratios, steps = np.zeros((count, 10), dtype=np.float32), [], []
+    for env in made:
+        env.reset(seed=0)
+        env.step(actions)
+    for _ in range(repeats):
+        spent = []
+        for env in made:
+            start = time.perf_counter()
+            for _ in range(40):
+                env.step(actions)
+            spent.append((time.perf_counter() - start) / 40)
+        ratios.append(spent[0] / spent[1])
+        steps.append(count / spent[1])
+    for env in made:
+        env.close()
+    return {"workers": workers, "times_faster": statistics.median(ratios), "steps_per_s": statistics.median(steps)}
+
+
 def reset_time() -> float:
     """Seconds of a soft reset of one Bullet environment."""
     env: Any = gymnasium.make("SydaTeleop-v0", **OPTIONS)
@@ -302,6 +350,11 @@ def measure(quick: bool) -> dict[str, Any]:
         "sixteen": {label: against_raw(16, hz, max(3, repeats // 3)) for label, hz in RATES.items()},
         "whole_body": {label: against_whole_body(hz, max(3, repeats // 3)) for label, hz in RATES.items()},
         "servo": {str(count): servo_vector(count, repeats) for count in (1, 32, 128, 1024)},
+        "disturbed": disturbed_vector(64, 5),
+        "workers": {
+            f"{count} {physics}": with_workers(count, physics, max(2, os.cpu_count() or 1), max(3, repeats // 5))
+            for count, physics in ((16, "bullet"), (32, "bullet"), (1024, "servo"))
+        },
         "reset_ms": 1e3 * reset_time(),
         "frame_ms": {"320x240": 1e3 * frame_time(320, 240), "640x480": 1e3 * frame_time(640, 480)},
         "peers": {"Humanoid-v5": humanoid(), "PandaReach-v3": panda()},
@@ -324,11 +377,18 @@ def table(result: dict[str, Any]) -> str:
             (f"16 robots, {label}: share of raw physics", f"{result['sixteen'][label]['share_of_raw']:.3f}", many)
         )
     for label, values in result["whole_body"].items():
-        rows.append((f"{label}: times faster than with the whole body", f"{values['times_faster']:.2f}", "1.8"))
+        bar = "1.8" if label.startswith("240") else ""
+        rows.append((f"{label}: times faster than with the whole body", f"{values['times_faster']:.2f}", bar))
         rows.append((f"{label}: arms apart from those of the whole body [rad]", f"{values['apart_rad']:.5f}", ""))
     for count, ratio in sorted(result["servo_times_raw"].items(), key=lambda row: int(row[0])):
         bar = f"{BARS['servo_1024_times_raw']}" if count == "1024" else ""
         rows.append((f"servo model, {count} robots: times raw physics at 240 Hz", f"{ratio:.0f}", bar))
+    for label, name in (("whole clips", "whole_clips"), ("uniform starts", "uniform_starts")):
+        ratio = f"{result['disturbed'][name]:.1f}"
+        rows.append((f"servo model, 64 robots, {label}: cost of a step with disturbances, without is 1", ratio, "3"))
+    for label, values in result["workers"].items():
+        what = f"{label.replace(' ', ' robots, ')}, workers={values['workers']}: times faster than in one process"
+        rows.append((what, f"{values['times_faster']:.2f}", ""))
     rows.append(("reset [ms]", f"{result['reset_ms']:.3f}", f"{BARS['reset_ms']}"))
     rows.append(("picture 320x240 [ms]", f"{result['frame_ms']['320x240']:.2f}", f"{BARS['frame_ms']}"))
     rows.append(("picture 640x480 [ms]", f"{result['frame_ms']['640x480']:.2f}", ""))
@@ -343,17 +403,40 @@ def table(result: dict[str, Any]) -> str:
         else:
             rows.append((peer, values, ""))
     lines = ["| " + " | ".join(row) + " |" for row in rows]
-    return "\n".join([lines[0], "|---|---|---|", *lines[1:]])
+    missed = [what for what, measured, bar in rows[1:] if bar and _missed(what, float(measured), float(bar))]
+    said = f"Missed: {'; '.join(missed)}." if missed else "No bar is missed."
+    return "\n".join([lines[0], "|---|---|---|", *lines[1:], "", said])
+
+
+def _missed(what: str, measured: float, bar: float) -> bool:
+    """Whether a figure is on the wrong side of its bar; of times, costs and memory less is better."""
+    less = what.startswith(("reset", "picture", "memory")) or "cost of a step" in what
+    return measured > bar if less else measured < bar
+
+
+def write_page(page: Path, content: str) -> None:
+    """Puts table and verdict where the page has those of the run before, and drops the note on an older release."""
+    text = page.read_text(encoding="utf-8")
+    text = re.sub(r"\*Measured with the first release[^\n]*\n\n", "", text)
+    pattern = re.escape(MARKER) + r"\n\n(?:\|[^\n]*\n)+\n[^\n]*\n"
+    text, count = re.subn(pattern, lambda _: f"{MARKER}\n\n{content}\n", text)
+    if count != 1:
+        raise SystemExit(f"{page}: expected one table with its verdict below {MARKER!r}, found {count}")
+    write_text(page, text)
 
 
 def main() -> None:
     """Measures, prints the table, writes the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", help="JSON file for all figures")
+    parser.add_argument("--page", type=Path, help="Markdown page whose table is replaced")
     parser.add_argument("--quick", action="store_true", help="few repeats, no memory measurements")
     arguments = parser.parse_args()
     result = measure(arguments.quick)
-    print(table(result))
+    content = table(result)
+    print(content)
+    if arguments.page:
+        write_page(arguments.page, content)
     if arguments.out:
         write_json(arguments.out, result)
     else:

@@ -1,7 +1,7 @@
 """Map a human's motion onto a humanoid, chain such maps, know which chain will work, and prove how good it is.
 
-Importing the package registers ``SydaTeleop-v0`` with Gymnasium. Everything else, PyTorch and PyBullet included, is
-loaded when it is first used.
+Importing the package registers ``SydaTeleop-v0`` and its family (``syda_gym.envs.family``) with Gymnasium. Everything
+else, PyTorch and PyBullet included, is loaded when it is first used.
 
     import gymnasium as gym
     import syda_gym
@@ -16,8 +16,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import gymnasium
-
+from syda_gym.envs.family import register_family
 from syda_gym.errors import SydaError
 
 if TYPE_CHECKING:
@@ -106,9 +105,4 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 
-if ENV_ID not in gymnasium.registry:  # the package may be reloaded
-    gymnasium.register(
-        id=ENV_ID,
-        entry_point="syda_gym.envs.teleop:SydaTeleopEnv",
-        vector_entry_point="syda_gym.envs.vector:SydaTeleopVectorEnv",
-    )
+register_family()

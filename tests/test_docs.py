@@ -139,7 +139,7 @@ def check_command(words: list[str]) -> None:
 def check_python(words: list[str]) -> None:
     """A script that is named exists; a module that is run can be found."""
     if words[:1] == ["-m"]:
-        assert words[1] in {"pip", "pytest", "venv", "build", "http.server"}, words
+        assert words[1] in {"pip", "pytest", "venv", "build", "http.server", "rl_zoo3.train"}, words
     elif words and words[0].endswith(".py"):
         script = ROOT / words[0]
         assert script.is_file(), f"no script {words[0]}"

@@ -24,9 +24,12 @@ RUNS: dict[str, tuple[list[str], str]] = {
     "08_sb3_from_scratch.py": (["1024"], "after 1024 steps"),
     "09_benchmark_on_ray.py": (["2"], "page: benchmark_on_ray"),
     "10_export_to_lerobot.py": (["episodes", "2"], "film: episodes"),
+    "cleanrl_style_ppo.py": (["30720"], "return at the beginning"),
+    "torchrl_ppo.py": (["2048"], "trained on 2048 steps"),
     "live_udp.py": (["4"], "median latency"),
 }
-NEEDS = {"10_export_to_lerobot.py": ("pyarrow", "data")}
+# Script -> package that it needs, and the extra it comes with.
+NEEDS = {"10_export_to_lerobot.py": ("pyarrow", "'syda-gym[data]'"), "torchrl_ppo.py": ("torchrl", "torchrl")}
 # Needs an environment of its own (RLlib pins another Gymnasium); it is parsed here and was run there.
 APART = {"rllib_from_scratch.py"}
 
@@ -50,8 +53,8 @@ def test_example_is_short_and_says_how_to_run_it(path: Path) -> None:
 def test_example_runs(script: str, tmp_path: Path) -> None:
     arguments, expected = RUNS[script]
     if script in NEEDS:
-        module, extra = NEEDS[script]
-        pytest.importorskip(module, reason=f"SKIPPED LOUDLY: {script} needs pip install 'syda-gym[{extra}]'")
+        module, package = NEEDS[script]
+        pytest.importorskip(module, reason=f"SKIPPED LOUDLY: {script} needs pip install {package}")
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg", "SYDA_GYM_HOME": str(tmp_path / "home")}
     result = subprocess.run(
         [sys.executable, FOLDER / script, *arguments],

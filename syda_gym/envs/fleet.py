@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +24,7 @@ from syda_gym.errors import OptionError
 from syda_gym.simulation.backend import MotorConditions
 from syda_gym.simulation.making import make_world
 
-__all__ = ["EpisodeWish", "Fleet"]
+__all__ = ["Ending", "EpisodeWish", "Fleet"]
 
 Generator = np.random.Generator
 
@@ -49,6 +49,16 @@ class EpisodeWish:
     route: int | None = None
 
 
+class Ending(NamedTuple):
+    """An episode that ended: robot, clip, first frame, number of frames, mean landmark error [m]."""
+
+    index: int
+    clip: int
+    start: int
+    frames: int
+    error: float
+
+
 class Fleet:
     """``count`` robots.
 
@@ -62,6 +72,7 @@ class Fleet:
         reward: ``(B,)`` of the last step.
         terminated: ``(B,)``.
         truncated: ``(B,)``.
+        ended: episodes that ended in the last step.
     """
 
     def __init__(self, options: TeleopOptions, count: int, max_steps: int | None = None) -> None:
@@ -108,6 +119,7 @@ class Fleet:
         self._past = np.zeros((count, 2, options.history, n))
         self._trail = [np.zeros((count, 3 * points)) for _ in range(3)]
         self._error_sum = np.zeros(count)
+        self.ended: list[Ending] = []
         self.reward, self._terms = np.zeros(count), np.zeros((len(TERMS), count))
         self.terminated, self.truncated = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
         self._success = np.zeros(count, dtype=bool)
@@ -190,6 +202,7 @@ class Fleet:
             OptionError: wrong shape, or an action that is not finite.
         """
         n, points, k, options = self._n, self._points, self._k, self.options
+        self.ended = []
         action = np.minimum(np.maximum(self._checked(actions), -1.0), 1.0)
         base = self._base
         if self._residual:
@@ -309,9 +322,13 @@ class Fleet:
         return {
             "q": self.world.pose[index, :n],
             "reference": self._target[index, :n],
-            "operator": self._scripts.operator_of_all(self._frame)[index],
+            "operator": self.watched()[index],
             "errors": self._distances[index, : self._points],
         }
+
+    def watched(self) -> FloatArray:
+        """Operator frames of the newest packets when the robots were compared last, ``(B, F)``."""
+        return self._scripts.operator_of_all(self._frame)
 
     def close(self) -> None:
         """Releases the world."""
@@ -419,5 +436,7 @@ class Fleet:
             error = float(self._error_sum[index]) / frames
             lived = not bool(self.terminated[index])
             self._success = self._success.copy()
-            self._success[index] = lived and error <= self.options.success_error
-            self._starts.learn(int(self.clip[index]), int(self._start[index]), frames, error)
+            self._success[index] = lived and error <= self.repertoire.success_error
+            ending = Ending(index, int(self.clip[index]), int(self._start[index]), frames, error)
+            self.ended.append(ending)
+            self._starts.learn(*ending[1:])

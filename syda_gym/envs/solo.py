@@ -223,7 +223,7 @@ class Solo(Fleet):
         frames = self._now - int(self._start[0])
         error = self._total / frames
         self._starts.learn(int(self.clip[0]), int(self._start[0]), frames, error)
-        return not terminated and error <= self.options.success_error
+        return not terminated and error <= self.repertoire.success_error
 
     def _sync(self) -> None:
         """Brings the fleet's arrays up to date, for pictures and pickles."""

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.envs.face import Face
+from syda_gym.envs.family import MAX_STEPS, warn_if_cut
 from syda_gym.envs.fleet import EpisodeWish, Fleet
 from syda_gym.envs.rendering import Painter
 from syda_gym.envs.spaces import action_from_command, action_space, one_info, wishes
@@ -50,7 +51,9 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
             ignores its action), ``same_step`` (the last observation is in ``infos["final_obs"]``), or ``disabled``
             (call ``reset(options={"reset_mask": mask})``).
         max_episode_steps: cuts episodes off (``truncated``) after so many steps, as ``gymnasium.make`` does by a
-            wrapper; ``is_success`` then judges the steps until there.
+            wrapper; ``is_success`` then judges the steps until there. -1 is no limit.
+        workers: processes that share the robots; the same bits as in one, and a million robots' steps in less time
+            where cores are idle. They are spawned, so a script must do its work under ``if __name__ == "__main__":``.
         options: options, ``None`` for the defaults.
         **changes: single options, as in ``SydaTeleopEnv``.
 
@@ -65,6 +68,7 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         *,
         autoreset_mode: str | AutoresetMode = "next_step",
         max_episode_steps: int | None = None,
+        workers: int = 1,
         options: TeleopOptions | None = None,
         **changes: Any,
     ) -> None:
@@ -72,13 +76,19 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
             raise OptionError(f"num_envs must be a positive whole number, got {num_envs!r}")
         if render_mode not in (None, "rgb_array"):
             raise OptionError(f"render_mode={render_mode!r}: many robots render as None or 'rgb_array'")
+        if not _is_whole(workers, 1) or workers > num_envs:
+            raise OptionError(f"workers must be a whole number from 1 to num_envs ({num_envs}), got {workers!r}")
+        if max_episode_steps == -1 and not isinstance(max_episode_steps, bool):
+            max_episode_steps = None
         if max_episode_steps is not None and not _is_whole(max_episode_steps, 1):
             raise OptionError(f"max_episode_steps must be a positive whole number or None, got {max_episode_steps!r}")
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.options = TeleopOptions.of(options, changes)
         self.num_envs = int(num_envs)
         self.render_mode = render_mode
-        self._fleet = Fleet(self.options, self.num_envs, max_episode_steps)
+        self._fleet = _fleet(self.options, self.num_envs, max_episode_steps, int(workers))
+        if max_episode_steps == MAX_STEPS:
+            warn_if_cut(self._fleet.repertoire.longest)
         self.metadata = {
             "render_modes": ["rgb_array"],
             "render_fps": round(self._fleet.rates.control_hz),
@@ -243,6 +253,14 @@ class SydaTeleopVectorEnv(Face, VectorEnv[Observations, NDArray[np.float32], Fla
         for index, value in enumerate(seeds):
             if value is not None and mask[index]:
                 self._rngs[index] = seeding.np_random(value)[0]
+
+
+def _fleet(options: TeleopOptions, count: int, max_steps: int | None, workers: int) -> Fleet:
+    if workers == 1:
+        return Fleet(options, count, max_steps)
+    from syda_gym.envs.parallel.fleet import ParallelFleet
+
+    return ParallelFleet(options, count, max_steps, workers)
 
 
 def _is_whole(value: Any, least: int) -> bool:

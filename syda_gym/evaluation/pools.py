@@ -13,16 +13,15 @@ depend on which pool it was. Three promises hold for all of them:
 from __future__ import annotations
 
 import os
-import signal
 import time
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 from syda_gym.errors import MissingExtraError, OptionError
+from syda_gym.processes import ONE_THREAD, Worker, begin_worker, end_workers, start_worker
 
 __all__ = ["Done", "InlinePool", "Opener", "Pool", "Schedule", "Tell", "Work", "make_pool", "run_jobs"]
 
@@ -35,11 +34,7 @@ Work = Callable[[Any, Tell], Any]
 Opener = Callable[..., Work]
 """Makes the work of one worker; called there once."""
 
-_ONE_THREAD = {
-    name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-}
 _TELL_SECONDS = 0.2  # between two messages about the progress of one job
-_PATIENCE_SECONDS = 3.0  # until a worker that was ended is killed
 
 
 @dataclass(frozen=True)
@@ -202,10 +197,9 @@ class InlinePool(Pool):
 
 @dataclass
 class _Member:
-    """One process of a pool, and the pipe to it."""
+    """One process of a pool."""
 
-    process: Any
-    pipe: Any
+    worker: Worker
     opened: bool = False
     busy: bool = field(default=False)
 
@@ -219,14 +213,14 @@ class ProcessPool(Pool):
         self._members: list[_Member] = []
         try:
             for _ in range(size):
-                self._members.append(_started())
+                self._members.append(_Member(start_worker(_serve)))
         except BaseException:
             self.close()
             raise
 
     def submit(self, worker: int, job: Any) -> None:
         """Gives a job to a worker; one that died meanwhile is replaced."""
-        if not self._members[worker].process.is_alive():
+        if not self._members[worker].worker.process.is_alive():
             self._replace(worker)
         try:
             self._send(worker, job)
@@ -240,8 +234,8 @@ class ProcessPool(Pool):
 
         while True:
             busy = {worker: member for worker, member in enumerate(self._members) if member.busy}
-            by_handle = {member.pipe: worker for worker, member in busy.items()}
-            by_handle |= {member.process.sentinel: worker for worker, member in busy.items()}
+            by_handle = {member.worker.pipe: worker for worker, member in busy.items()}
+            by_handle |= {member.worker.process.sentinel: worker for worker, member in busy.items()}
             for worker in {by_handle[handle] for handle in wait(list(by_handle))}:
                 done = self._heard(worker, told)
                 if done is not None:
@@ -251,72 +245,40 @@ class ProcessPool(Pool):
     def close(self) -> None:
         """Ends the processes; those that do not listen are killed."""
         members, self._members = self._members, []
-        for member in members:
-            member.process.terminate()
-        deadline = time.monotonic() + _PATIENCE_SECONDS
-        for member in members:
-            member.process.join(max(0.0, deadline - time.monotonic()))
-            if member.process.is_alive():
-                member.process.kill()
-                member.process.join()
-            member.pipe.close()
+        end_workers([member.worker for member in members])
 
     def _send(self, worker: int, job: Any) -> None:
         member = self._members[worker]
         if not member.opened:
-            member.pipe.send((self._opener, self._arguments))
+            member.worker.pipe.send((self._opener, self._arguments))
             member.opened = True
-        member.pipe.send(job)
+        member.worker.pipe.send(job)
         member.busy = True
 
     def _replace(self, worker: int) -> None:
-        lost = self._members[worker]
-        lost.process.join(_PATIENCE_SECONDS)
+        lost = self._members[worker].worker
+        lost.lost()
         lost.pipe.close()
-        self._members[worker] = _started()
+        self._members[worker] = _Member(start_worker(_serve))
 
     def _heard(self, worker: int, told: Callable[[int, float], None]) -> Done | None:
         """One message of a worker; what it said last counts, even if it is gone."""
-        member = self._members[worker]
+        lost = self._members[worker].worker
         try:
-            if member.pipe.poll():
-                kind, content = member.pipe.recv()
+            if lost.pipe.poll():
+                kind, content = lost.pipe.recv()
                 if kind == "told":
                     told(worker, content)
                     return None
                 return Done(worker, content) if kind == "result" else Done(worker, failure=content)
         except (EOFError, OSError):
             pass  # it died with half a word
-        member.process.join(_PATIENCE_SECONDS)
-        if member.process.is_alive():
-            member.process.kill()
-            member.process.join()
-        return Done(worker, failure=_why_lost(member.process.exitcode))
-
-
-def _started() -> _Member:
-    """A fresh process: spawned, not forked, for PyBullet clients and torch threads do not survive a fork."""
-    import multiprocessing
-    from multiprocessing import resource_tracker
-
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_serve, args=(theirs,), daemon=True)
-    if os.name == "posix":
-        resource_tracker.ensure_running()  # otherwise started below, where it would let Ctrl-C through again
-    with _environment(_ONE_THREAD), _interrupts_held_back():
-        process.start()
-    theirs.close()
-    return _Member(process, ours)
+        return Done(worker, failure=lost.lost())
 
 
 def _serve(pipe: Any) -> None:
     """The life of a worker: opened by the first message, then one answer to every job."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to everybody; the caller decides
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
-    _follow_parent()
+    begin_worker()
     try:
         opener, arguments = pipe.recv()
         work: Work | None = None
@@ -347,33 +309,6 @@ def _teller(pipe: Any) -> Tell:
     return tell
 
 
-def _follow_parent() -> None:
-    """Ends this process when its parent is gone: a killed run leaves nobody behind."""
-    import multiprocessing
-    from multiprocessing.connection import wait
-    from threading import Thread
-
-    parent = multiprocessing.parent_process()
-
-    def follow() -> None:
-        if parent is not None:
-            wait([parent.sentinel])
-            os._exit(1)
-
-    Thread(target=follow, name="follow-parent", daemon=True).start()
-
-
-def _why_lost(code: int | None) -> str:
-    if code is not None and code < 0:
-        try:
-            name = signal.Signals(-code).name
-        except ValueError:
-            name = f"signal {-code}"
-        hint = "; out of memory? try fewer workers" if name == "SIGKILL" else ""
-        return f"the worker was ended by {name}{hint}"
-    return f"the worker ended by itself with exit code {code}"
-
-
 class RayPool(Pool):
     """Actors on a Ray cluster; a job of a lost actor is computed again by a new one. Nothing is told from inside."""
 
@@ -391,7 +326,7 @@ class RayPool(Pool):
                     include_dashboard=False,
                     log_to_driver=False,
                     logging_level="error",
-                    runtime_env={"env_vars": _ONE_THREAD},
+                    runtime_env={"env_vars": ONE_THREAD},
                 )
             except (ConnectionError, RuntimeError, ValueError) as error:
                 raise OptionError(
@@ -441,31 +376,3 @@ class _Actor:
 
 def _trace(error: BaseException) -> str:
     return "".join(traceback.format_exception(error))
-
-
-@contextmanager
-def _environment(values: dict[str, str]) -> Iterator[None]:
-    """Environment variables that a process started inside the block inherits."""
-    before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
-
-
-@contextmanager
-def _interrupts_held_back() -> Iterator[None]:
-    """A process started inside the block hears no Ctrl-C until it says so; this one hears it after the block."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

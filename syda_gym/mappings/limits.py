@@ -81,9 +81,8 @@ def limit_speed(robot: Robot, frames: ArrayLike, fps: float) -> FloatArray:
     if (np.abs(np.diff(q, axis=-2)) <= _step(robot, fps) + _SLACK).all():
         return q
     clips: FloatArray = q.reshape(-1, *q.shape[-2:])
-    for k in range(1, clips.shape[1]):
-        clips[:, k] = step_towards(robot, clips[:, k - 1], clips[:, k], fps)
-    return q
+    _limit_clips(robot, clips, fps)
+    return clips.reshape(q.shape)
 
 
 def speed_violations(robot: Robot, frames: ArrayLike, fps: float) -> NDArray[np.bool_]:
@@ -91,6 +90,29 @@ def speed_violations(robot: Robot, frames: ArrayLike, fps: float) -> NDArray[np.
     q = robot.check(frames)
     result: NDArray[np.bool_] = np.abs(np.diff(q, axis=0)) * float(fps) > robot.speed * (1.0 + 1e-9)
     return result
+
+
+def _limit_clips(robot: Robot, clips: FloatArray, fps: float) -> None:
+    """``step_towards`` from frame to frame of clips ``(B, N, n)``, in place; compiled, for resets wait for it."""
+    from syda_gym.embodiments.limb_ik.compiling import first_call
+    from syda_gym.mappings.limit_kernel import limit_clips
+
+    coupled = robot._coupled
+    at, low, high = (np.concatenate([np.zeros(0), *[row[part] for row in coupled]]) for part in (2, 3, 4))
+    first_call(
+        limit_clips,
+        clips,
+        _step(robot, fps),
+        _SLACK,
+        robot.lower,
+        robot.upper,
+        np.array([row[0] for row in coupled], dtype=np.int64),
+        np.array([row[1] for row in coupled], dtype=np.int64),
+        np.cumsum([0, *[len(row[2]) for row in coupled]]).astype(np.int64),
+        at,
+        low,
+        high,
+    )
 
 
 def _step(robot: Robot, fps: float) -> FloatArray:

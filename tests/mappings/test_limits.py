@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from syda_gym.embodiments import catalog
 from syda_gym.errors import OptionError
-from syda_gym.mappings.limits import SpeedLimiter, limit_speed, speed_violations
+from syda_gym.mappings.limits import SpeedLimiter, limit_speed, speed_violations, step_towards
 
 
 @given(seed=st.integers(0, 10_000))
@@ -46,3 +46,17 @@ def test_a_limiter_can_start_where_the_robot_is():
     assert (np.abs(limiter(goal) - robot.rest) <= robot.speed / 30.0 + 1e-9).all()
     with pytest.raises(OptionError, match="fps"):
         SpeedLimiter(robot, 0.0)
+
+
+@pytest.mark.parametrize("name", ["pepper", "nao"])
+def test_clips_equal_their_frames_bit_for_bit(name):
+    robot = catalog.get(name)
+    wild = np.cumsum(np.random.default_rng(0).normal(0.0, 0.2, (3, 60, robot.n_features)), axis=1)
+    limited = limit_speed(robot, wild, 30.0)
+    for clip, found in zip(wild, limited, strict=True):
+        frame = robot.clamp(clip[:1])
+        assert np.array_equal(found[:1], frame)
+        for k in range(1, 60):
+            frame = step_towards(robot, frame, robot.clamp(clip[k : k + 1]), 30.0)
+            assert np.array_equal(found[k], frame[0])
+    assert not np.array_equal(limited, wild)

@@ -92,10 +92,13 @@ def _walk(arm, q, points, origins, axes):
 
 
 @compiled
-def look(arm, q, found, columns, turning):
-    """Directions of both limbs (6,), derivatives (m, 6), and how each mover turns the arm about its length (m,)."""
+def look(arm, q, found, columns, turning, places):
+    """Directions of both limbs (6,), derivatives (m, 6), and how each mover turns the arm about its length (m,).
+
+    ``places`` ``(3 + 2 k, 3)`` is written over: allocating it at every call would cost a sixth of the time.
+    """
     k = len(arm.steps)
-    points, origins, axes = np.empty((3, 3)), np.empty((k, 3)), np.empty((k, 3))
+    points, origins, axes = places[:3], places[3 : 3 + k], places[3 + k :]
     _walk(arm, q, points, origins, axes)
     for limb in range(2):
         at = 3 * limb
@@ -273,16 +276,20 @@ def refine(arm, q, target, lower, upper, anchor, hold, firm):
     m = len(arm.movers)
     found, columns, turning = np.empty(6), np.empty((m, 6)), np.empty(m)
     ahead, after, turned = np.empty(6), np.empty((m, 6)), np.empty(m)
+    places = np.empty((3 + 2 * len(arm.steps), 3))
     low, high, trial = np.empty(len(q)), np.empty(len(q)), np.empty(len(q))
     matrix, slope, step, free = np.empty((m, m)), np.empty(m), np.empty(m), np.empty(m, np.bool_)
     slopes, ties, weights = np.empty((len(arm.governed), 2)), np.empty(len(arm.governed)), np.empty(6)
-    look(arm, anchor, ahead, after, turning)  # the turn is measured from the anchor
-    look(arm, q, found, columns, turned)
+    look(arm, anchor, found, columns, turning, places)  # the turn is measured from the anchor
+    if _away(q, anchor) > 0.0:
+        look(arm, q, found, columns, turned, places)
+    else:
+        copy(turning, turned)
     cost, damping = _cost(arm, found, target, q, anchor, hold, firm, turning), DAMPING
     for _ in range(STEPS):
-        for d in range(6):
-            gap = _gap(found, target, d - d % 3)
-            weights[d] = BLUR / math.sqrt(gap + BLUR * BLUR)
+        for limb in (0, 3):
+            weight = BLUR / math.sqrt(_gap(found, target, limb) + BLUR * BLUR)
+            weights[limb] = weights[limb + 1] = weights[limb + 2] = weight
         turn = 0.0
         for i in range(m):
             turn += turning[i] * (q[arm.movers[i]] - anchor[arm.movers[i]])
@@ -316,7 +323,7 @@ def refine(arm, q, target, lower, upper, anchor, hold, firm):
         if promised < LEAST_GAIN:
             break
         _project(arm, trial, lower, upper, anchor)
-        look(arm, trial, ahead, after, turned)
+        look(arm, trial, ahead, after, turned, places)
         reached = _cost(arm, ahead, target, trial, anchor, hold, firm, turning)
         gain = cost - reached
         if gain <= LEAST_GAIN and damping > 10.0:
@@ -339,6 +346,7 @@ def solve_arm(arm, target, near, q):
     count = closed + len(arm.seeds)
     starts, misses = np.empty((count, len(q))), np.empty(count)
     found, columns, turning = np.empty(6), np.empty((len(arm.movers), 6)), np.empty(len(arm.movers))
+    places = np.empty((3 + 2 * len(arm.steps), 3))
     if closed:
         closed_form(arm, target, starts)
     for row in range(len(arm.seeds)):
@@ -348,7 +356,7 @@ def solve_arm(arm, target, near, q):
         if row == closed and best >= 0 and misses[best] < NEAR:
             break  # the closed form has it
         _project(arm, starts[row], arm.lower, arm.upper, arm.rest)
-        look(arm, starts[row], found, columns, turning)
+        look(arm, starts[row], found, columns, turning, places)
         misses[row] = _miss(found, target)
         score = misses[row] + PULL * _away(starts[row], near)
         if score < least:
@@ -379,16 +387,17 @@ def _crossing(arm, start, goal, target, staying):
     """
     on_the_way, found = np.empty(len(start)), np.empty(6)
     columns, turning = np.empty((len(arm.movers), 6)), np.empty(len(arm.movers))
+    places = np.empty((3 + 2 * len(arm.steps), 3))
     longest, total = 0.0, 0.0
     for stop in range(WAY):
         share = (stop + 1.0) / (WAY + 1.0)
         for j in range(len(start)):
             on_the_way[j] = start[j] + share * (goal[j] - start[j])
             longest = max(longest, abs(goal[j] - start[j]) / arm.speed[j])
-        look(arm, on_the_way, found, columns, turning)
+        look(arm, on_the_way, found, columns, turning, places)
         miss = _miss(found, target)
         on_the_way[arm.hinge] = start[arm.hinge]
-        look(arm, on_the_way, found, columns, turning)
+        look(arm, on_the_way, found, columns, turning, places)
         total += max(0.0, min(miss, _miss(found, target)) - staying)
     return longest * total / WAY
 
@@ -437,9 +446,13 @@ def follow_arm(arm, target, dt, limited, fresh, state):
         # Where this branch leads without speed limits, and where the best of all branches is.
         copy(goal, other)
         along = refine(arm, goal, target, arm.lower, arm.upper, other, REST, 0.0)
-        best = solve_arm(arm, target, before, other)
-        patience = max(0.0, patience + (along - best - arm.habits.margin) * dt)
-        if patience > max(arm.habits.patience, _crossing(arm, before, other, target, along)):
+        gain = along - arm.habits.margin  # if the best pose hit the directions; where that cannot pay, nobody searches
+        if patience + gain * dt > 0.0:
+            best = solve_arm(arm, target, before, other)
+            patience = max(0.0, patience + (along - best - arm.habits.margin) * dt)
+        else:
+            patience = 0.0
+        if patience > arm.habits.patience and patience > _crossing(arm, before, other, target, along):
             copy(other, goal)
             patience, going = 0.0, True
         if going:  # another branch is never jumped to

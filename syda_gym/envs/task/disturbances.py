@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -206,12 +206,14 @@ class Disturbances:
 
     def draw(self, rng: np.random.Generator) -> Drawn:
         """The values of one episode; the draws do not depend on which disturbances are on."""
-        shares = rng.random(len(_ALLOWED))
-        values = {}
-        for share, field in zip(shares.tolist(), fields(self), strict=True):
-            low, high = _ends(getattr(self, field.name), field.name)
-            values[field.name] = low + share * (high - low)
-        return Drawn(**values)
+        low, high = self._bounds
+        return Drawn(*(low + rng.random(len(_ALLOWED)) * (high - low)).tolist())
+
+    @cached_property
+    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper end of every range, in the order of ``Drawn``."""
+        low, high = np.array([_ends(getattr(self, field.name), field.name) for field in fields(self)]).T
+        return low, high
 
 
 @dataclass(frozen=True)
@@ -342,10 +344,11 @@ def _straight_elbows(robot: Robot) -> tuple[float, ...]:
 
 def _correlated(fresh: FloatArray, correlation: float) -> FloatArray:
     """First-order autoregressive noise of unit variance along the first axis."""
-    noise = fresh.copy()
-    share = float(np.sqrt(1.0 - correlation**2))
+    noise = fresh * float(np.sqrt(1.0 - correlation**2))
+    noise[0], before = fresh[0], np.empty_like(fresh[0])
     for index in range(1, len(noise)):
-        noise[index] = correlation * noise[index - 1] + share * fresh[index]
+        np.multiply(noise[index - 1], correlation, out=before)
+        noise[index] += before
     return noise
 
 

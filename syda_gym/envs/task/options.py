@@ -22,7 +22,7 @@ from syda_gym.simulation.rates import Rates
 if TYPE_CHECKING:
     from syda_gym.mappings.mapping import Mapping
 
-__all__ = ["ACTION_MODES", "REFERENCES", "STARTS", "TeleopOptions"]
+__all__ = ["ACTION_MODES", "REFERENCES", "STARTS", "SUCCESS_ERRORS", "TeleopOptions"]
 
 ACTION_MODES = ("residual", "position")
 """Actions are corrections of the base command, or joint angles."""
@@ -33,6 +33,11 @@ operator and robot were recorded together."""
 
 STARTS = ("first", "uniform", "failures")
 """Start frame: the clip's first, any, or more often where the landmark error is large."""
+
+
+SUCCESS_ERRORS = {"paired": 0.041, "mapped": 0.008}
+"""``success_error`` where it is not given, by reference [m]: the median over the training actions of the mean landmark
+error of the base (adult to Pepper, nothing disturbed; ``scripts/build_leaderboard.py --calibrate``)."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +73,7 @@ class TeleopOptions:
     whole_body: bool = False
     reward: RewardWeights | Dict[str, Any] | None = None
     terminate_error: float | None = None
-    success_error: float = 0.1
+    success_error: float | None = None
     start: str = "first"
     disturbances: str | Disturbances | Dict[str, Any] | None = None
     camera: CameraView | Dict[str, Any] | None = None
@@ -90,7 +95,8 @@ class TeleopOptions:
         for name, low, high in (("preview", 0, 60), ("history", 0, 60), ("fit_seed", 0, 2**32 - 1)):
             _check_whole(name, getattr(self, name), low, high)
         _check_number("residual_scale", self.residual_scale, 1e-3, np.pi)
-        _check_number("success_error", self.success_error, 1e-4, 10.0)
+        if self.success_error is not None:
+            _check_number("success_error", self.success_error, 1e-4, 10.0)
         if self.terminate_error is not None:
             _check_number("terminate_error", self.terminate_error, 1e-4, 10.0)
         for name in ("self_collision", "whole_body"):

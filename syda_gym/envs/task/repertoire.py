@@ -19,7 +19,7 @@ from syda_gym.embodiments.catalog import is_robot_file
 from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.envs.task.disturbances import freeze_elbow_yaw
-from syda_gym.envs.task.options import TeleopOptions
+from syda_gym.envs.task.options import SUCCESS_ERRORS, TeleopOptions
 from syda_gym.errors import EmbodimentError, MappingError, MotionError, OptionError, RouteError, nearest_name
 from syda_gym.mappings.limits import limit_speed, step_towards
 from syda_gym.motions.clip import MotionClip, Motions, Take
@@ -56,6 +56,7 @@ class Repertoire:
         routes: the routes that an episode may take.
         clip_routes: index of the route that each clip takes unless the caller says otherwise.
         operator_rows: ``(rows, F)`` operator frames.
+        success_error: mean landmark error of a successful episode [m].
     """
 
     def __init__(self, options: TeleopOptions) -> None:
@@ -93,6 +94,8 @@ class Repertoire:
         self._targets: dict[float, FloatArray] = {}
         self.mapped_rows(0)  # now, so that a mapping that cannot be fitted says so at once
         self._paired_rows = _padded([clip.frames for clip in target]) if paired else None
+        given = options.success_error
+        self.success_error = SUCCESS_ERRORS["paired" if paired else "mapped"] if given is None else float(given)
 
     @property
     def longest(self) -> int:
