@@ -42,7 +42,7 @@ from syda_gym.teleoperation.incoming.packets import encode_frame
 from syda_gym.teleoperation.safety.limiter import CommandLimiter
 from syda_gym.teleoperation.safety.motion import Motion
 from syda_gym.teleoperation.safety.plausibility import Plausibility
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
+from syda_gym.simulation.collision.self_collision import SelfCollision
 from syda_gym.teleoperation.tick import State
 
 DT = 1 / 30

@@ -18,7 +18,7 @@ from syda_gym.teleoperation.safety.limiter import CommandLimiter
 from syda_gym.teleoperation.safety.motion import Motion
 from syda_gym.teleoperation.safety.one_euro import OneEuroFilter
 from syda_gym.teleoperation.safety.plausibility import Plausibility
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
+from syda_gym.simulation.collision.self_collision import SelfCollision
 from syda_gym.teleoperation.safety.trust import ConfidencePolicy
 from syda_gym.teleoperation.safety.watchdog import Watch, Watchdog
 from syda_gym.teleoperation.tick import CONTROLS, Decision, LoopSettings, State, Tick

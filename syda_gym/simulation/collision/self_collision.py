@@ -14,7 +14,7 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.kinematics.urdf import UrdfTree, configuration, read_urdf
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
-from syda_gym.teleoperation.safety.clearance import Clearance
+from syda_gym.simulation.collision.clearance import Clearance
 
 __all__ = ["RESERVE", "SelfCollision"]
 
