@@ -283,9 +283,9 @@ RIVALS: Mapping[str, Rival] = {
     "base": Rival("the mapping's command, unchanged", lambda i: BaseAlone(i), {}),
     "lead": Rival("analytic inverse of the motor lag", lambda i, **s: Lead(i, BaseAlone(i), **s), _STRENGTH),
     "adaptive_lead": Rival(
-        "lead by the share that the motors were seen to cover",
+        "lead by the share that the motors were seen to cover, which brakes in time",
         _adaptive_lead,
-        {"memory": Range(0.5, 0.98), "least": Range(0.4, 1.0)} | _STRENGTH,
+        {"memory": Range(0.5, 0.98), "least": Range(0.4, 1.0), "braking": Range(0.3, 3.0, log=True)} | _STRENGTH,
     ),
     "one_euro": Rival("One-Euro filter", lambda i, **s: OneEuro(i, BaseAlone(i), **s), _EURO),
     "one_euro_lead": Rival("One-Euro filter, then lead", _one_euro_lead, _EURO | _STRENGTH),

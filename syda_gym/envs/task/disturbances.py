@@ -74,7 +74,7 @@ _DYNAMICS: dict[str, tuple[Range, Range, Range]] = {
     "friction": ((0.0, 0.3), (0.0, 0.3), (0.0, 0.5)),
     "changes": ((0.2, 1.0), 0.5, 1.0),
 }
-"""In ``dynamics`` nothing is known beforehand, so that every level is a range; ``harsh`` goes beyond that of training."""
+"""In ``dynamics`` nothing is known beforehand, so that every level is a range; ``harsh`` goes beyond the others."""
 
 _ALLOWED: dict[str, tuple[float, float]] = {
     "noise": (0.0, 0.5),
