@@ -56,7 +56,8 @@ HISTORY = 4
 VARIANTS = 4
 EPISODES = 160
 HELD = 48
-DRAWS = 3
+DRAWS = 2
+LEARNED = ("predictor", "policy")
 BAR = 0.95
 PREDICTOR = {"iterations": 400, "rounds": 4, "bound": 0.3}
 POLICY = {
@@ -161,9 +162,9 @@ def below_policy(out: Path, seed: int, seeds: int, interface: Interface) -> Agen
     return rivals(out, interface)[best]
 
 
-def train_policies(out: Path, seeds: int) -> None:
-    """One policy per seed."""
-    for seed in range(seeds):
+def train_policies(out: Path, seeds: int, only: int | None = None) -> None:
+    """One policy per seed, or that of one seed."""
+    for seed in range(seeds) if only is None else [only]:
         path = out / f"policy-{seed}"
         if path.with_suffix(".json").is_file():
             continue
@@ -180,15 +181,14 @@ def train_policies(out: Path, seeds: int) -> None:
         print(path.name, about, flush=True)
 
 
-def test(out: Path, seeds: int) -> None:
-    """Every agent on the test motions, in Bullet; what was played is kept agent by agent."""
+def test(out: Path, seeds: int, only: str | None = None) -> None:
+    """Every agent on the test motions, or one of them, in Bullet; what was played is kept agent by agent."""
     interface, judged = interface_of(TEST, 103), in_bullet(TEST, 103, "test")
-    agents = rivals(out, interface)
-    for kind in ("predictor", "policy"):
-        agents |= {f"{kind}-{seed}": load_agent(out / f"{kind}-{seed}", interface) for seed in range(seeds)}
-    for name, agent in agents.items():
+    names = list(rivals(out, interface)) + [f"{kind}-{seed}" for kind in LEARNED for seed in range(seeds)]
+    for name in names if only is None else [only]:
         path = out / "test" / f"{name}.json"
         if not path.is_file():
+            agent = load_agent(out / name, interface) if name not in RIVALS else rivals(out, interface)[name]
             results = evaluate(judged, {name: agent}, draws=DRAWS, seed=9000)[name]
             write_json(path, [{"motion": result.motion, **result.figures.as_dict()} for result in results])
             print(name, mean_of(results).as_dict(), flush=True)
@@ -197,7 +197,7 @@ def test(out: Path, seeds: int) -> None:
 def report(out: Path, seeds: int) -> None:
     """Prints the table of the study and writes everything that is known."""
     rows = {name: read_json(out / "test" / f"{name}.json") for name in ("base", *RANGES)}
-    for kind in ("predictor", "policy"):
+    for kind in LEARNED:
         played = [read_json(out / "test" / f"{kind}-{seed}.json") for seed in range(seeds)]
         rows[kind] = [row for found in played for row in found]
     listed = [name for name in rows if name not in ("policy", "adaptive_lead")]
