@@ -55,9 +55,7 @@ MARGINS = {
 }
 """Margins that are tried [m]. Sliding looks at the shapes themselves, the projection at capsules inside them."""
 
-FEWER = (
-    0.05  # share of the base's contact steps that may be left where settings are chosen; on other motions more is left
-)
+FEWER = 0.05  # share of the base's contact steps that may be left where settings are chosen; elsewhere more will be
 DETOUR = (0.05, 0.25)  # rad, standard deviation of the random detours
 KNOTS = 6
 EVERY = 3  # of the training motions, for tuning

@@ -64,8 +64,8 @@ POLICY = {
     "base": "base", "steps": 80_000, "legs": 4, "learning_rate": 4e-4, "scale": 0.15, "smoothing": 0.5,
     "log_std": -3.0, "rollout": 64, "batch": 2048,
 }  # fmt: skip
-"""What differs from the preset ``teleop``: smaller corrections and less exploration, whose noise costs more than the error
-that is left to repair."""
+"""What differs from the preset ``teleop``: smaller corrections and less exploration, whose noise costs more than the
+error that is left to repair."""
 
 
 def options(families: tuple[str, ...], seed: int, variants: int, **changes: Any) -> TeleopOptions:
@@ -181,7 +181,7 @@ def train_policies(out: Path, seeds: int, only: int | None = None) -> None:
         print(path.name, about, flush=True)
 
 
-def test(out: Path, seeds: int, only: str | None = None) -> None:
+def judge(out: Path, seeds: int, only: str | None = None) -> None:
     """Every agent on the test motions, or one of them, in Bullet; what was played is kept agent by agent."""
     interface, judged = interface_of(TEST, 103), in_bullet(TEST, 103, "test")
     names = list(rivals(out, interface)) + [f"{kind}-{seed}" for kind in LEARNED for seed in range(seeds)]
@@ -252,7 +252,7 @@ def main() -> None:
         "tune": lambda: tune_rivals(given.out),
         "predict": lambda: predict(given.out, given.seeds),
         "policy": lambda: train_policies(given.out, given.seeds),
-        "test": lambda: test(given.out, given.seeds),
+        "test": lambda: judge(given.out, given.seeds),
         "report": lambda: report(given.out, given.seeds),
     }
     for stage in given.stages:

@@ -100,7 +100,7 @@ class AdaptiveLead(Agent):
         if not self.braking:
             return way
         half = 0.5 * self._slowing
-        # A step of v leaves way - v, on which the joint must stop: v^2 / 2 + half v <= slowing (way - v + v), rounded up.
+        # A step of v, and each later one shorter by ``slowing``, cover v^2 / (2 slowing) + v / 2 in all.
         most = np.sqrt(half**2 + 2.0 * self._slowing * np.abs(way)) - half
         return np.asarray(np.sign(way) * np.minimum(np.abs(way), most))
 
