@@ -163,7 +163,7 @@ def test_the_study_chooses_the_least_j_among_settings_with_few_contacts(study):
     base = Figures(9.0, 10.0, 1.0, 0.1)
     settings = {
         "touches": Figures(1.0, 10.0, 1.0, 0.02),
-        "clear": Figures(2.0, 10.0, 1.0, 0.015),
+        "clear": Figures(2.0, 10.0, 1.0, 0.005),
         "clearest": Figures(3.0, 10.0, 1.0, 0.0),
     }
     assert study.choose(base, settings) == "clear"
