@@ -60,6 +60,7 @@ LEVELS = ("train", "test", "harsh")
 
 SINGLE_DISTURBANCES = (
     "skeleton_noise", "dropout", "link", "packet_loss", "weak_motors", "payload", "friction", "wrong_scale",
+    "dynamics",
 )  # fmt: skip
 """Disturbances that are written ``NAME:LEVEL``."""
 
