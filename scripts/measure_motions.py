@@ -12,7 +12,7 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.files import asset, write_json
 from syda_gym.motions import Motions, PairedMotions, describe, load_motions
 from syda_gym.motions.pairing.conform import limb_directions_of
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
+from syda_gym.simulation.collision.self_collision import SelfCollision
 
 PAIRS = (("adult", "pepper"), ("kid", "pepper"), ("stiff", "pepper"), ("adult", "kid"), ("pepper", "adult"))
 RIDGE = 0.1

@@ -43,13 +43,13 @@ from syda_gym.files import atomic_path
 from syda_gym.mappings.fitting.fit import fit
 from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.motions.loading import load_motions
+from syda_gym.simulation.collision.self_collision import SelfCollision
 from syda_gym.teleoperation import LoopSettings, TeleoperationLoop, Tick, UdpSink, UdpSource, run
 from syda_gym.teleoperation.calibration import Calibration
 from syda_gym.teleoperation.incoming.packets import encode_frame, encode_request
 from syda_gym.teleoperation.safety.limiter import CommandLimiter
 from syda_gym.teleoperation.safety.motion import Motion
 from syda_gym.teleoperation.safety.plausibility import Plausibility
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
 from syda_gym.teleoperation.tick import State
 
 DT = 1 / 30

@@ -162,6 +162,6 @@ class Interface:
         return nearest_name(str(column), self.layout)
 
 
-def lag_share(gain: float, substeps: int) -> float:
+def lag_share(gain: float | FloatArray, substeps: int) -> float | FloatArray:
     """Share of the way that a first-order motor covers in one control step: ``1 - (1 - gain) ** substeps``."""
     return 1.0 - (1.0 - gain) ** substeps

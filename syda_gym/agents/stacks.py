@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syda_gym.agents.agent import Agent, BaseAlone
+from syda_gym.agents.classical.adaptive import AdaptiveLead
 from syda_gym.agents.classical.projection import Projection
 from syda_gym.agents.classical.rivals import Ema, Kalman, Lead, OneEuro
+from syda_gym.agents.classical.sliding import Sliding
 from syda_gym.agents.interface import Interface
 from syda_gym.agents.learned.policy import ResidualPolicy
 from syda_gym.agents.learned.predictor import Predictor
@@ -21,7 +23,8 @@ __all__ = ["AGENTS", "build_stack", "stack_arrays", "stack_spec"]
 Arrays = Mapping[str, NDArray[Any]]
 
 AGENTS: Mapping[str, type[Agent]] = {
-    kind.name: kind for kind in (BaseAlone, Lead, Ema, OneEuro, Kalman, Projection, Predictor, ResidualPolicy)
+    kind.name: kind
+    for kind in (BaseAlone, Lead, AdaptiveLead, Ema, OneEuro, Kalman, Projection, Sliding, Predictor, ResidualPolicy)
 }
 """Every kind of agent by name."""
 

@@ -62,6 +62,7 @@ LEVELS = ("train", "test", "harsh")
 
 SINGLE_DISTURBANCES = (
     "skeleton_noise", "dropout", "link", "packet_loss", "weak_motors", "payload", "friction", "wrong_scale",
+    "dynamics",
 )  # fmt: skip
 """Disturbances that are written ``NAME:LEVEL``."""
 
@@ -74,7 +75,10 @@ DEFINITIONS = ("dry_run", "general", "paper")
 PREDICTORS = ("dry_run", "T", "C", "L", "coverage", "arm_length_ratio", "hops", "measured")
 """What a route can be chosen by."""
 
-RIVALS = ("base", "lead", "one_euro", "one_euro_lead", "ema_lead", "projection", "projection_lead", "kalman")
+RIVALS = (
+    "base", "lead", "adaptive_lead", "one_euro", "one_euro_lead", "ema_lead", "projection", "projection_lead",
+    "sliding_lead", "kalman",
+)  # fmt: skip
 """Classical agents."""
 
 SHIPPED_AGENTS = tuple(

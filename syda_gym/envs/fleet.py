@@ -21,8 +21,8 @@ from syda_gym.envs.task.scripts import Scripts
 from syda_gym.envs.task.starts import StartSampler
 from syda_gym.envs.task.tracking import TERMS, in_order, reward_terms
 from syda_gym.errors import OptionError
-from syda_gym.simulation.backend import MotorConditions
 from syda_gym.simulation.making import make_world
+from syda_gym.simulation.motor_plan import NEVER, MotorPlan
 
 __all__ = ["Ending", "EpisodeWish", "Fleet"]
 
@@ -108,7 +108,9 @@ class Fleet:
         self._journal = np.zeros((count, frames, n))
         self._robots = np.arange(count)
         self._start_q = np.repeat(self.robot.rest[None], count, axis=0)
-        self._conditions = [MotorConditions()] * count
+        self._plans = [MotorPlan()] * count
+        self._change_at = np.full(count, NEVER)
+        self._changing = options.disturbed is not None and options.disturbed.changes != 0.0
         zeros = np.zeros((count, n))
         self._k = np.zeros(count, dtype=np.intp)
         self._length = np.zeros(count, dtype=np.intp)
@@ -163,10 +165,7 @@ class Fleet:
         for index, rng, wish in zip(which, rngs, wishes, strict=True):
             clip, frame, route = self._draw(rng, wish)
             self.clip[index], self._k[index], self.route[index] = clip, frame, route
-            conditions = self._scripts.write(index, clip, frame, route, rng)
-            if conditions is not None:
-                self._conditions[index] = conditions
-                self.world.set_conditions(index, conditions)
+            self._take_plan(index, frame, self._scripts.write(index, clip, frame, route, rng))
         self._start[rows] = self._frame[rows] = k = self._k[rows]
         length = self._scripts.lengths[self.clip[rows]]
         self._length[rows] = length if self._max_steps is None else np.minimum(length, k + self._max_steps)
@@ -216,6 +215,8 @@ class Fleet:
             self._remember(base)
         if self._journal.size:
             self._journal[self._robots, k] = command
+        if self._changing:
+            self._change_motors(k)
         self.world.advance(command)
         pose = self.world.pose
         self._frame = k
@@ -349,19 +350,38 @@ class Fleet:
     def _replay(self) -> None:
         """Leads a fresh world to where the pickled one was: every robot repeats its commands since its reset."""
         steps = self._k - self._start
-        for index in range(self.count):
-            self.world.set_conditions(index, self._conditions[index])
+        for index, plan in enumerate(self._plans):
+            self.world.set_conditions(index, plan.first)
         self.world.reset(np.arange(self.count), self._start_q)
         longest = int(steps.max())
         for time in range(longest):
             late = np.flatnonzero(longest - steps == time)
             if len(late) and time:
                 self.world.reset(late, self._start_q[late])
-            past = np.minimum(self._start + np.maximum(time - (longest - steps), 0), self._journal.shape[1] - 1)
+            done = np.maximum(time - (longest - steps), 0)
+            for index, plan in enumerate(self._plans if self._changing else ()):
+                self.world.set_conditions(index, plan.at(int(done[index])))
+            past = np.minimum(self._start + done, self._journal.shape[1] - 1)
             self.world.advance(self._journal[self._robots, past])
         fresh = np.flatnonzero(steps == 0)
         if len(fresh) and longest:
             self.world.reset(fresh, self._start_q[fresh])
+
+    def _take_plan(self, index: int, frame: int, plan: MotorPlan | None) -> None:
+        """The motors of an episode that begins at ``frame``; ``None`` if nothing is disturbed."""
+        if plan is not None:
+            self._plans[index] = plan
+            self._change_at[index] = plan.next_change(0) + frame if plan.changes else NEVER
+            self.world.set_conditions(index, plan.first)
+
+    def _change_motors(self, k: NDArray[np.intp]) -> None:
+        """Changes the motors of the robots whose plan says so for the step at hand."""
+        for index in np.flatnonzero(self._change_at <= k).tolist():
+            start, plan = int(self._start[index]), self._plans[index]
+            step = int(k[index]) - start
+            self.world.set_conditions(index, plan.at(step))
+            after = plan.next_change(step)
+            self._change_at[index] = after if after == NEVER else after + start
 
     def _new_world(self) -> Any:
         options = self.options

@@ -48,10 +48,7 @@ class Solo(Fleet):
         n = self._n
         clip, k, route = self._draw(rng, wish)
         self.clip[0], self.route[0], self._start[0] = clip, route, k
-        conditions = self._scripts.write(0, clip, k, route, rng)
-        if conditions is not None:
-            self._conditions[0] = conditions
-            self.world.set_conditions(0, conditions)
+        self._take_plan(0, k, self._scripts.write(0, clip, k, route, rng))
         self._scripts.turn_to(0)
         self._now, self._last, self._total = k, int(self._scripts.lengths[clip]), 0.0
         self._labels = self.names(0)
@@ -86,6 +83,8 @@ class Solo(Fleet):
             self._remember(self._base_now[None])
         if self._journal.size:
             self._journal[0, k] = command
+        if self._changing and k >= self._change_at[0]:
+            self._change_motors(np.array([k]))
         state = np.array(self.world.advance_one(command.tolist()))
         target = self._scripts.target_row(k)
         error = state[:-n] - target

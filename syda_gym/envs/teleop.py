@@ -203,6 +203,7 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
 
     Disturbances are off by default; ``syda_gym.envs.task.disturbances`` lists the cells (``lag``, ``noise``,
     ``latency``, ``noise+latency``, ``full``), the levels (``train``, ``test``, ``harsh``) and the single presets.
+    ``"dynamics"`` draws motors, payload and friction anew for every episode and changes them within it.
 
     ## Determinism
 

@@ -10,6 +10,7 @@ import numpy as np
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import OptionError, SydaError, TeleoperationError, nearest_name
 from syda_gym.mappings.mapping import Mapping
+from syda_gym.simulation.collision.self_collision import SelfCollision
 from syda_gym.teleoperation.calibration import Calibration, Calibrator
 from syda_gym.teleoperation.guarded import GuardedMapping
 from syda_gym.teleoperation.incoming.frame_clock import FrameClock
@@ -18,7 +19,6 @@ from syda_gym.teleoperation.safety.limiter import CommandLimiter
 from syda_gym.teleoperation.safety.motion import Motion
 from syda_gym.teleoperation.safety.one_euro import OneEuroFilter
 from syda_gym.teleoperation.safety.plausibility import Plausibility
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
 from syda_gym.teleoperation.safety.trust import ConfidencePolicy
 from syda_gym.teleoperation.safety.watchdog import Watch, Watchdog
 from syda_gym.teleoperation.tick import CONTROLS, Decision, LoopSettings, State, Tick

@@ -14,12 +14,15 @@ from syda_gym.agents.agent import BaseAlone
 from syda_gym.agents.classical.avoidance import avoiding
 from syda_gym.agents.classical.projection import Projection, capsule_model
 from syda_gym.agents.classical.rivals import make_rival
+from syda_gym.agents.classical.sliding import Sliding
 from syda_gym.agents.figures import Figures, jitter
 from syda_gym.agents.predictor.contact_term import ContactTerm
 from syda_gym.agents.predictor.predictor_training import PredictorConfig, train_predictor
-from syda_gym.agents.streams.streams import Streams, score_streams
+from syda_gym.agents.stacks import build_stack, stack_spec
+from syda_gym.agents.streams.streams import Streams, play_streams, score_streams
 from syda_gym.errors import AgentError
 from syda_gym.motions.synthetic.generator import generate
+from syda_gym.simulation.collision.self_collision import SelfCollision
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +62,34 @@ def test_the_projecting_rival_touches_far_less_than_the_base(interface, crossing
     projected = score_streams(make_rival("projection", interface, margin=0.005), crossing, rates, capsules=model)
     assert base.contact_steps > 0.2
     assert projected.contact_steps < 0.4 * base.contact_steps  # the clips begin inside a contact
+
+
+def test_sliding_keeps_its_distance_once_it_is_free(interface, crossing, rates):
+    exact = SelfCollision(interface.robot, 0.0)
+
+    def nearest(q: np.ndarray) -> float:
+        found = exact.near(q, 0.05)[0]
+        return float(found.min()) if len(found) else 0.05
+
+    q, rows = {}, range(20, 60)  # the clips begin inside a contact
+    for name in ("base", "sliding_lead"):
+        q[name] = play_streams(make_rival(name, interface), crossing, rates)
+    clear = {name: np.array([[nearest(found[e, t]) for t in rows] for e in range(2)]) for name, found in q.items()}
+    assert (clear["base"] < 0.0).mean() > 0.2
+    assert (clear["sliding_lead"] > 0.0).all()
+    assert np.abs(q["sliding_lead"] - crossing.reference)[:, 20:].mean() < 0.03  # it does not stay behind
+
+
+def test_sliding_leaves_free_commands_alone_is_stored_and_refuses_nonsense(interface, rates):
+    rest = np.tile(interface.robot.rest, (1, 10, 1))
+    streams = Streams(rest, np.zeros((1, 10)), rest, np.array([10]))
+    lead, sliding = make_rival("lead", interface), make_rival("sliding_lead", interface, margin=0.001)
+    assert np.array_equal(play_streams(lead, streams, rates), play_streams(sliding, streams, rates))
+    assert sliding.stack == ("base", "lead", "sliding")
+    again = build_stack(interface, stack_spec(sliding))
+    assert again.settings == {"margin": 0.001, "approach": 0.9}
+    with pytest.raises(AgentError, match="approach"):
+        Sliding(interface, BaseAlone(interface), approach=0.0)
 
 
 def test_avoiding_references_are_free_near_the_old_ones_and_smoother_than_projection(interface, crossing):
@@ -132,7 +163,7 @@ def test_the_study_chooses_the_least_j_among_settings_with_few_contacts(study):
     base = Figures(9.0, 10.0, 1.0, 0.1)
     settings = {
         "touches": Figures(1.0, 10.0, 1.0, 0.02),
-        "clear": Figures(2.0, 10.0, 1.0, 0.015),
+        "clear": Figures(2.0, 10.0, 1.0, 0.005),
         "clearest": Figures(3.0, 10.0, 1.0, 0.0),
     }
     assert study.choose(base, settings) == "clear"

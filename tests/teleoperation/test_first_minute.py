@@ -16,8 +16,8 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.mappings.mapping import Mapping
 from syda_gym.mappings.methods.unfitted import unfitted
 from syda_gym.routes.piloting.choice import choose_mapping
+from syda_gym.simulation.collision.self_collision import SelfCollision
 from syda_gym.teleoperation.loop import TeleoperationLoop
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
 from syda_gym.teleoperation.tick import Decision, LoopSettings, State, Tick
 
 Limbs = tuple[tuple[float, float, float], tuple[float, float, float]]

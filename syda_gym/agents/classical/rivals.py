@@ -25,14 +25,14 @@ class Lead(Agent):
     Args:
         interface: robot, rate, motors and observation layout.
         base: the agent below.
-        strength: share of the lead, 0 to 1.
+        strength: share of the lead, 0 to 1; up to 2 for motors that are known to be weaker than nominal.
     """
 
     name = "lead"
 
     def __init__(self, interface: Interface, base: Agent, *, strength: float = 1.0) -> None:
         super().__init__(interface, base)
-        self.strength = _between("strength", strength, 0.0, 1.0)
+        self.strength = _between("strength", strength, 0.0, 2.0)
 
     def improve(self, command: FloatArray, reading: Reading) -> FloatArray:
         """``q + (1 + strength (1 / alpha - 1)) (command - q)``."""
@@ -254,6 +254,12 @@ def _kalman_lead(interface: Interface, *, strength: float = 1.0, **settings: flo
     return Lead(interface, Kalman(interface, BaseAlone(interface), **settings), strength=strength)
 
 
+def _adaptive_lead(interface: Interface, **settings: float) -> Agent:
+    from syda_gym.agents.classical.adaptive import AdaptiveLead
+
+    return AdaptiveLead(interface, BaseAlone(interface), **settings)
+
+
 def _projection(interface: Interface, **settings: float) -> Agent:
     from syda_gym.agents.classical.projection import Projection
 
@@ -264,12 +270,23 @@ def _projection_lead(interface: Interface, *, strength: float = 1.0, **settings:
     return Lead(interface, _projection(interface, **settings), strength=strength)
 
 
-CONTACT_RIVALS = ("projection", "projection_lead")
+def _sliding_lead(interface: Interface, *, strength: float = 1.0, **settings: float) -> Agent:
+    from syda_gym.agents.classical.sliding import Sliding
+
+    return Sliding(interface, Lead(interface, BaseAlone(interface), strength=strength), **settings)
+
+
+CONTACT_RIVALS = ("projection", "projection_lead", "sliding_lead")
 """Rivals that only matter where the arms touch something; they cost more time than the others."""
 
 RIVALS: Mapping[str, Rival] = {
     "base": Rival("the mapping's command, unchanged", lambda i: BaseAlone(i), {}),
     "lead": Rival("analytic inverse of the motor lag", lambda i, **s: Lead(i, BaseAlone(i), **s), _STRENGTH),
+    "adaptive_lead": Rival(
+        "lead by the share that the motors were seen to cover, which brakes in time",
+        _adaptive_lead,
+        {"memory": Range(0.5, 0.98), "least": Range(0.4, 1.0), "braking": Range(0.3, 3.0, log=True)} | _STRENGTH,
+    ),
     "one_euro": Rival("One-Euro filter", lambda i, **s: OneEuro(i, BaseAlone(i), **s), _EURO),
     "one_euro_lead": Rival("One-Euro filter, then lead", _one_euro_lead, _EURO | _STRENGTH),
     "ema_lead": Rival("exponential average, then lead", _ema_lead, {"rate": Range(0.05, 1.0, log=True)} | _STRENGTH),
@@ -278,6 +295,11 @@ RIVALS: Mapping[str, Rival] = {
         "nearest command out of contact, then lead",
         _projection_lead,
         {"margin": Range(0.0, 0.03)} | _STRENGTH,
+    ),
+    "sliding_lead": Rival(
+        "lead, then slides along the robot's own body",
+        _sliding_lead,
+        {"margin": Range(0.0, 0.01), "approach": Range(0.3, 1.0)} | _STRENGTH,
     ),
     "kalman": Rival("constant-velocity Kalman filter on packet times, then lead", _kalman_lead, _KALMAN | _STRENGTH),
 }

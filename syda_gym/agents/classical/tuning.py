@@ -42,7 +42,15 @@ class Tuned:
         return make_rival(self.name, interface, **self.settings)
 
 
-def tune(name: str, interface: Interface, score: Score, *, budget: int = 32, seed: int = 0) -> Tuned:
+def tune(
+    name: str,
+    interface: Interface,
+    score: Score,
+    *,
+    budget: int = 32,
+    seed: int = 0,
+    ranges: Mapping[str, Range] | None = None,
+) -> Tuned:
     """Finds the settings of a rival with the least objective ``J`` (see ``Figures.objective``).
 
     Half of the budget is spread evenly (a scrambled Sobol sequence, on a logarithmic scale where a setting spans
@@ -55,6 +63,7 @@ def tune(name: str, interface: Interface, score: Score, *, budget: int = 32, see
         score: plays an agent on the training motions.
         budget: number of settings to play, at least 1; one is enough for a rival without settings.
         seed: of the search.
+        ranges: where to look instead of in the rival's own ranges.
 
     Raises:
         AgentError: unknown rival or no budget.
@@ -63,7 +72,7 @@ def tune(name: str, interface: Interface, score: Score, *, budget: int = 32, see
         raise AgentError(f"unknown agent {name!r}; {nearest_name(name, RIVALS)}")
     if budget < 1:
         raise AgentError(f"tuning needs a budget of at least 1, got {budget}")
-    ranges = RIVALS[name].ranges
+    ranges = RIVALS[name].ranges if ranges is None else ranges
     search = _Search(ranges, budget if ranges else 1, seed)
     best: Tuned | None = None
     for index in range(search.budget):

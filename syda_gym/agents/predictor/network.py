@@ -76,16 +76,27 @@ def response(shares: FloatArray, steps: int) -> tuple[Tensor, Tensor]:
     """How much of each earlier command, and of the start, is in the angle after a step.
 
     Args:
-        shares: share ``k`` of the way that a motor covers in one step ``(E, 1)``.
+        shares: share ``k`` of the way that a motor covers in one step ``(E, 1)``, or in each step ``(E, T)``.
         steps: ``T``.
 
     Returns:
         Weights of the commands ``(E, T, T)`` and of the start ``(E, T)``.
     """
     k = _constant(shares)
+    if k.shape[1] > 1:
+        return _changing_response(k)
     ages = torch.arange(steps)[:, None] - torch.arange(steps)[None]
     weights = k[:, :, None] * (1.0 - k[:, :, None]) ** ages.clamp(min=0)
     return torch.where(ages >= 0, weights, torch.zeros(())), (1.0 - k) ** torch.arange(1, steps + 1)[None]
+
+
+def _changing_response(k: Tensor) -> tuple[Tensor, Tensor]:
+    """``response`` for shares ``(E, T)`` that change: what a command left is passed on by each later step."""
+    steps = k.shape[1]
+    later = torch.arange(steps)[:, None] > torch.arange(steps)[None]
+    passed = torch.where(later, (1.0 - k)[:, :, None], torch.ones(())).cumprod(dim=1)
+    weights = torch.where(torch.ones(steps, steps).tril().bool(), passed * k[:, None], torch.zeros(()))
+    return weights, (1.0 - k).cumprod(dim=1)
 
 
 def tcn(parameters: dict[str, Tensor], inputs: Tensor) -> Tensor:

@@ -211,7 +211,8 @@ class _Trainer:
             self._targets = self._kinematics(self._reference)
         self._mask = torch.as_tensor(self.streams.mask)
         self._window = min(config.window, self.streams.base.shape[1])
-        self._response = response(_motor_shares(self.streams, rates, config), self._window)
+        self._shares = _motor_shares(self.streams, rates, config)
+        self._response = response(self._shares[:, :1], self._window) if self._shares.shape[1] == 1 else None
         self._inputs = torch.zeros(0)
         self._commands = torch.as_tensor(self._below, dtype=torch.float32)
         self._contact = ContactTerm(self.interface.robot, config.contact_margin) if config.contact_weight else None
@@ -259,6 +260,15 @@ class _Trainer:
             self._schedule.step()
             self._blend()
 
+    def _powers(self, rows: torch.Tensor, times: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """How the motors of episodes ``rows`` respond in the steps ``times`` ``(B, W)``."""
+        from syda_gym.agents.predictor.network import response
+
+        if self._response is None:
+            return response(self._shares[rows.numpy()[:, None], times.numpy()], self._window)
+        weights, left = self._response
+        return weights[rows], left[rows]
+
     def _blend(self) -> None:
         """Moves the running average towards the weights as they are now."""
         share = 1.0 - self.config.averaging
@@ -282,8 +292,7 @@ class _Trainer:
         bound = self.config.bound
         correction = tcn(self._parameters, seen)[:, ahead:]
         commands = self._commands[at] + bound * torch.tanh(correction / bound)
-        weights, left = self._response
-        q = follow(commands, self._before[rows, starts], (weights[rows], left[rows]))
+        q = follow(commands, self._before[rows, starts], self._powers(rows, times[:, ahead:]))
         mask, points, targets = self._mask[at], self._kinematics(q), self._targets[at]
         landmark = 1e3 * _masked(_length(points - targets).mean(-1), mask)
         joint = 1e3 * _masked((q - self._reference[at]).abs().mean(-1), mask)
@@ -305,11 +314,15 @@ def commands_below(base: Agent, streams: Streams) -> FloatArray:
 
 
 def _motor_shares(streams: Streams, rates: Rates, config: PredictorConfig) -> FloatArray:
-    """How far a robot with a nominal lead on top gets towards the command in one step, ``(E, 1)``."""
+    """How far a robot with a nominal lead on top gets towards the command in one step.
+
+    ``(E, 1)``, or ``(E, T)`` where motors change within an episode.
+    """
     nominal = rates.lag_share
     factor = 1.0 + config.strength * (1.0 / nominal - 1.0)
-    gains = [motors.gain for motors in streams.motors] or [1.0] * len(streams)
-    return np.array([[factor * lag_share(rates.motor_gain * gain, rates.substeps)] for gain in gains])
+    steps = streams.base.shape[1] if any(plan.changes for plan in streams.motors) else 1
+    gains = np.array([plan.gains(steps) for plan in streams.motors] or [[1.0]] * len(streams))
+    return np.asarray(factor * lag_share(rates.motor_gain * gains, rates.substeps))
 
 
 def _with_mirror(interface: Interface, streams: Streams) -> Streams:

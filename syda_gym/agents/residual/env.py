@@ -76,6 +76,7 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
         self._capsules = capsule_model(self.interface.robot) if weights.contact else None
         robot, shape = self.interface.robot, streams.reference.shape
         self._targets = robot.landmarks(streams.reference.reshape(-1, n)).reshape(*shape[:2], -1, 3)
+        self._changing = streams.changing
         self._actions = np.zeros((count, n))
         self.raw_features = np.zeros((count, features))
         self._episode: NDArray[np.int64] = np.zeros(count, dtype=np.int64)
@@ -112,6 +113,8 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
         below = self._below
         q = self.world.pose[:, :n]
         self._past.add(self.streams.base[self._episode, self._step], q)
+        for row in np.flatnonzero(self._changing[self._episode, self._step]).tolist():
+            self.world.set_conditions(row, self.streams.motors[self._episode[row]].at(int(self._step[row])))
         self.world.advance(limited(self.interface, below + self.scale * self._correction, below, q))
         reward = (self._shadow_cost[self._episode, self._step] - self._cost()) / self.weights.scale
         self._step = self._step + 1
@@ -158,7 +161,7 @@ class ResidualVecEnv(VecEnv):  # type: ignore[misc]
         start = np.where(steps[:, None] > 0, self._shadow_q[episodes, np.maximum(steps - 1, 0)], base)
         if self.streams.motors:
             for row in rows.tolist():
-                self.world.set_conditions(row, self.streams.motors[self._episode[row]])
+                self.world.set_conditions(row, self.streams.motors[self._episode[row]].at(int(self._step[row])))
         self.world.reset(rows, start)
         self._past.begin(rows, base)
         self._trail[:, rows] = self._landmarks()[rows]

@@ -12,6 +12,7 @@ from syda_gym.agents.interface import Interface
 from syda_gym.agents.streams.streams import Streams
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.envs.task.disturbances import Drawn, deliver, freeze_elbow_yaw, see, warm_up
+from syda_gym.envs.task.dynamics import motor_plan
 from syda_gym.envs.task.observation import MAX_AGE, teleop_layout
 from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.envs.task.repertoire import Repertoire
@@ -110,7 +111,11 @@ class Ground:
             age,
             reference,
             np.array([self.repertoire.clips[clip].length for clip in plays], dtype=np.int64),
-            tuple(d.motors for d in drawn if d is not None),
+            tuple(
+                motor_plan(disturbed, values, self.repertoire.clips[clip].length, self.rates.dt)
+                for clip, values in zip(plays, drawn, strict=True)
+                if disturbed is not None and values is not None
+            ),
             tuple(self.repertoire.clips[clip].name for clip in plays),
             operator,
             ahead.reshape(*base.shape[:2], -1, base.shape[2]) if self.options.preview else None,

@@ -20,9 +20,9 @@ from syda_gym.agents.interface import Interface, Reading
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import AgentError
-from syda_gym.simulation.backend import MotorConditions
 from syda_gym.simulation.capsules import CapsuleModel
 from syda_gym.simulation.making import make_world
+from syda_gym.simulation.motor_plan import MotorPlan, changing_steps
 from syda_gym.simulation.rates import Rates
 
 __all__ = ["Past", "Streams", "join", "play_streams", "score_streams"]
@@ -37,7 +37,7 @@ class Streams:
         age: of the packet ``(E, T)`` [s].
         reference: where the joints should be after the step ``(E, T, n)`` [rad].
         lengths: control steps of each episode ``(E,)``.
-        motors: how each robot differs from the nominal one; nominal if empty.
+        motors: how each robot differs from the nominal one, and when that changes; nominal if empty.
         names: of each episode, for tables.
         operator: newest operator frame at hand ``(E, T, F)``; only needed where an agent reads whole observations.
         ahead: base commands of the ``k`` steps to come ``(E, T, k, n)`` [rad]; only where a preview is shown.
@@ -47,7 +47,7 @@ class Streams:
     age: FloatArray
     reference: FloatArray
     lengths: NDArray[np.int64]
-    motors: tuple[MotorConditions, ...] = ()
+    motors: tuple[MotorPlan, ...] = ()
     names: tuple[str, ...] = field(default=())
     operator: FloatArray | None = None
     ahead: FloatArray | None = None
@@ -62,7 +62,7 @@ class Streams:
         if self.lengths.shape != (episodes,) or (self.lengths < 4).any() or (self.lengths > steps).any():
             raise AgentError("streams need one length per episode, at least 4 and at most T")
         if self.motors and len(self.motors) != episodes:
-            raise AgentError(f"{len(self.motors)} motor conditions for {episodes} episodes; give one each or none")
+            raise AgentError(f"{len(self.motors)} motor plans for {episodes} episodes; give one each or none")
 
     def __len__(self) -> int:
         return len(self.base)
@@ -86,6 +86,12 @@ class Streams:
         """Which steps belong to their episode ``(E, T)``."""
         return np.arange(self.base.shape[1])[None] < self.lengths[:, None]
 
+    @property
+    def changing(self) -> NDArray[np.bool_]:
+        """Steps in which a robot's motors or payload change, ``(E, T)``."""
+        plans = self.motors or (MotorPlan(),) * len(self)
+        return changing_steps(plans, self.base.shape[1])
+
 
 def join(parts: Sequence[Streams]) -> Streams:
     """All episodes of several streams, padded to the longest by repeating the last step."""
@@ -101,7 +107,7 @@ def join(parts: Sequence[Streams]) -> Streams:
         np.concatenate([padded(part.age) for part in parts]),
         np.concatenate([padded(part.reference) for part in parts]),
         np.concatenate([part.lengths for part in parts]),
-        tuple(m for p in parts for m in (p.motors or (MotorConditions(),) * len(p))) if with_motors else (),
+        tuple(m for p in parts for m in (p.motors or (MotorPlan(),) * len(p))) if with_motors else (),
         tuple(name for part in parts for name in (part.names or ("",) * len(part))),
         None if any(p.operator is None for p in parts) else np.concatenate([padded(p.operator) for p in parts]),
         None if any(p.ahead is None for p in parts) else np.concatenate([padded(p.ahead) for p in parts]),
@@ -127,8 +133,9 @@ def play_streams(agent: Agent, streams: Streams, rates: Rates) -> FloatArray:
         raise AgentError(f"the agent is made for dt={interface.dt}, alpha={interface.alpha}; got {rates}")
     episodes, steps = streams.base.shape[:2]
     world = make_world(interface.robot, rates, count=episodes, physics="servo")
-    for index, motors in enumerate(streams.motors):
-        world.set_conditions(index, motors)
+    for index, plan in enumerate(streams.motors):
+        world.set_conditions(index, plan.first)
+    changing = streams.changing
     world.reset(np.arange(episodes, dtype=np.intp), streams.base[:, 0])
     agent.reset(episodes)
     result = np.empty_like(streams.base)
@@ -139,6 +146,8 @@ def play_streams(agent: Agent, streams: Streams, rates: Rates) -> FloatArray:
         q = world.pose[:, :n]
         command = agent.act_on(read_stream(interface, streams, t, q, world.qd, past.rows))
         past.add(streams.base[:, t], q)
+        for index in np.flatnonzero(changing[:, t]).tolist():
+            world.set_conditions(index, streams.motors[index].at(t))
         world.advance(command)
         result[:, t] = world.pose[:, :n]
     world.close()

@@ -47,8 +47,9 @@ PRESETS: dict[str, tuple[str, ...]] = {
     "payload": ("payload",),
     "friction": ("friction",),
     "wrong_scale": ("operator_scale",),
+    "dynamics": ("motor_gain", "motor_speed", "payload", "friction", "changes"),
 }
-"""Single disturbances, written ``"NAME:LEVEL"``."""
+"""Single disturbances, written ``"NAME:LEVEL"``. ``dynamics`` draws a robot for every episode and changes it within."""
 
 _FRAME = 1.0 / 30.0  # s; the suite counts latency in frames at 30 Hz
 
@@ -65,6 +66,15 @@ _VALUES: dict[str, tuple[Range, Range, Range]] = {
     "friction": ((0.0, 0.3), 0.2, 0.5),
     "operator_scale": ((0.85, 1.15), 1.10, 1.20),
 }
+
+_DYNAMICS: dict[str, tuple[Range, Range, Range]] = {
+    "motor_gain": ((0.65, 1.0), (0.65, 1.0), (0.5, 1.0)),
+    "motor_speed": ((0.65, 1.0), (0.65, 1.0), (0.5, 1.0)),
+    "payload": ((0.0, 0.6), (0.0, 0.6), (0.0, 0.9)),
+    "friction": ((0.0, 0.3), (0.0, 0.3), (0.0, 0.5)),
+    "changes": ((0.2, 1.0), 0.5, 1.0),
+}
+"""In ``dynamics`` nothing is known beforehand, so that every level is a range; ``harsh`` goes beyond the others."""
 
 _ALLOWED: dict[str, tuple[float, float]] = {
     "noise": (0.0, 0.5),
@@ -83,7 +93,11 @@ _ALLOWED: dict[str, tuple[float, float]] = {
     "friction": (0.0, 0.95),
     "operator_scale": (0.3, 3.0),
     "freeze_elbow_yaw": (0.0, 1.0),
+    "changes": (0.0, 20.0),
 }
+
+_SHARES = 16
+"""Random numbers drawn for an episode: as many as in the first release, so that its seeds give the same episodes."""
 
 _LONGEST_DROPOUT = 10
 _WARM_UP = 24
@@ -111,6 +125,8 @@ class Disturbances:
         operator_scale: factor on the operator's landmark coordinates, as if calibrated for another person.
         freeze_elbow_yaw: where the sine of the elbow's angle is below this, the joint that turns the elbow keeps its
             last command, because a straight arm does not say where its elbow points; 0 switches it off.
+        changes: how many times a second, on average, the motors, the payload or the friction are drawn anew within the
+            episode, from their ranges; see ``envs.task.dynamics``.
 
     Raises:
         OptionError: a value outside its range, or a range upside down.
@@ -132,6 +148,7 @@ class Disturbances:
     friction: Range = 0.0
     operator_scale: Range = 1.0
     freeze_elbow_yaw: float = 0.15
+    changes: Range = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -155,7 +172,8 @@ class Disturbances:
             raise OptionError(f"unknown disturbances {cell!r}; {nearest_name(cell, known)}")
         if level not in LEVELS:
             raise OptionError(f"unknown level {level!r}; {nearest_name(level, LEVELS)}")
-        values: dict[str, Any] = {name: _VALUES[name][LEVELS.index(level)] for name in known[cell]}
+        table = _DYNAMICS if cell == "dynamics" else _VALUES
+        values: dict[str, Any] = {name: table[name][LEVELS.index(level)] for name in known[cell]}
         return cls(**values)
 
     @classmethod
@@ -207,13 +225,21 @@ class Disturbances:
     def draw(self, rng: np.random.Generator) -> Drawn:
         """The values of one episode; the draws do not depend on which disturbances are on."""
         low, high = self._bounds
-        return Drawn(*(low + rng.random(len(_ALLOWED)) * (high - low)).tolist())
+        shares = rng.random(_SHARES)
+        seed = int(shares[-1] * 2**53)
+        last = float(np.random.default_rng(seed).random()) if high[-1] > low[-1] else 0.0
+        return Drawn(*(low + np.append(shares, last) * (high - low)).tolist(), seed_of_changes=seed + 1)
 
     @cached_property
     def _bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lower and upper end of every range, in the order of ``Drawn``."""
         low, high = np.array([_ends(getattr(self, field.name), field.name) for field in fields(self)]).T
         return low, high
+
+    def at_share(self, name: str, share: float) -> float:
+        """The value of a disturbance at a share in [0, 1) of its range."""
+        low, high = _ends(getattr(self, name), name)
+        return low + share * (high - low)
 
 
 @dataclass(frozen=True)
@@ -236,10 +262,12 @@ class Drawn:
     friction: float
     operator_scale: float
     freeze_elbow_yaw: float
+    changes: float = 0.0
+    seed_of_changes: int = 0
 
     @property
     def motors(self) -> MotorConditions:
-        """What the robot feels of it."""
+        """What the robot feels of it when the episode begins."""
         return MotorConditions(self.motor_gain, self.motor_speed, self.payload, self.friction)
 
 

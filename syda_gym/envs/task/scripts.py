@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.envs.task.disturbances import Disturbances, Drawn, deliver, freeze_elbow_yaw, see, warm_up
+from syda_gym.envs.task.dynamics import motor_plan
 from syda_gym.envs.task.observation import MAX_AGE
 from syda_gym.envs.task.options import TeleopOptions
 from syda_gym.envs.task.repertoire import Repertoire
-from syda_gym.simulation.backend import MotorConditions
+from syda_gym.simulation.motor_plan import MotorPlan
 
 __all__ = ["Scripts"]
 
@@ -61,7 +62,7 @@ class Scripts:
             self._age_rows = np.zeros(count * self._page)
             self._base_at = self._operator_at = np.arange(count, dtype=np.intp) * self._page
 
-    def write(self, index: int, clip: int, frame: int, route: int, rng: np.random.Generator) -> MotorConditions | None:
+    def write(self, index: int, clip: int, frame: int, route: int, rng: np.random.Generator) -> MotorPlan | None:
         """Prepares one robot's episode.
 
         Args:
@@ -72,7 +73,7 @@ class Scripts:
             rng: random numbers of the disturbances.
 
         Returns:
-            The robot's motors and payload, ``None`` if nothing is disturbed.
+            The robot's motors and payload over the episode, ``None`` if nothing is disturbed.
         """
         first = self._firsts[clip]
         self._target_at[index] = first
@@ -82,7 +83,7 @@ class Scripts:
             return None
         drawn = self._disturbances.draw(rng)
         self._write_page(index, clip, frame, route, drawn, rng)
-        return drawn.motors
+        return motor_plan(self._disturbances, drawn, int(self.lengths[clip]) - frame, self._dt)
 
     def draw_route(self, share: float) -> int:
         """A planned route, drawn in proportion to transferability, for a share in [0, 1)."""

@@ -8,8 +8,8 @@ from collections.abc import Generator, Iterator, Sequence
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.simulation.collision.self_collision import SelfCollision
 from syda_gym.teleoperation.safety.limiter import CommandLimiter
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
 
 __all__ = ["Detour"]
 

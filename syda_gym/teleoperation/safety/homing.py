@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
+from syda_gym.simulation.collision.self_collision import SelfCollision
 from syda_gym.teleoperation.safety.watchdog import Ease
 
 __all__ = ["WayHome"]

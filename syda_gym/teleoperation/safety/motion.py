@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
+from syda_gym.simulation.collision.self_collision import SelfCollision
+from syda_gym.simulation.collision.slide import slide
 from syda_gym.teleoperation.safety.detour import Detour
 from syda_gym.teleoperation.safety.limiter import CommandLimiter
 from syda_gym.teleoperation.safety.pace import Pace, braking_speed
 from syda_gym.teleoperation.safety.punctuality import GENTLE
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
-from syda_gym.teleoperation.safety.slide import slide
 
 __all__ = ["Motion", "Moved"]
 

@@ -16,8 +16,8 @@ from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.embodiments.robot import Robot, RobotDescription
 from syda_gym.errors import EmbodimentError, OptionError
 from syda_gym.files import write_text
+from syda_gym.simulation.collision.self_collision import SelfCollision
 from syda_gym.simulation.plain_body import weak_joints
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
 from syda_gym.teleoperation.setup.robot_picture import draw_robot
 from syda_gym.teleoperation.setup.robot_yaml import robot_yaml
 from syda_gym.teleoperation.setup.verdict import Verdict, judge_robot

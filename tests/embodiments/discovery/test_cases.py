@@ -12,9 +12,9 @@ from syda_gym.embodiments import catalog
 from syda_gym.embodiments.discovery.arms import discover, search
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import EmbodimentError, MissingExtraError
+from syda_gym.simulation.collision.self_collision import SelfCollision
 from syda_gym.simulation.making import make_world
 from syda_gym.simulation.rates import Rates
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
 
 CASES = Path(__file__).with_name("cases")
 REFUSED = ("reversed_limits", "telescoping_arm")

@@ -8,12 +8,12 @@ import pytest
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
+from syda_gym.simulation.collision.self_collision import SelfCollision
+from syda_gym.simulation.collision.slide import slide
 from syda_gym.teleoperation.safety.detour import Detour
 from syda_gym.teleoperation.safety.limiter import CommandLimiter
 from syda_gym.teleoperation.safety.motion import Motion
 from syda_gym.teleoperation.safety.pace import Pace, braking_speed
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
-from syda_gym.teleoperation.safety.slide import slide
 
 DT = 1 / 30
 

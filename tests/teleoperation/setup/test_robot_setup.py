@@ -15,8 +15,8 @@ from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import EmbodimentError, OptionError
 from syda_gym.files import asset
 from syda_gym.routes.piloting.choice import choose_mapping
+from syda_gym.simulation.collision.self_collision import SelfCollision
 from syda_gym.teleoperation.loop import TeleoperationLoop
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
 from syda_gym.teleoperation.setup.robot_setup import add_robot, describe_robot
 from syda_gym.teleoperation.tick import LoopSettings, State, Tick
 

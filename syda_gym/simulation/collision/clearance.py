@@ -73,7 +73,7 @@ class Clearance:
 def _arithmetic() -> tuple[Any, Any]:
     """The compiled part; numba is imported where shapes are looked at, not before."""
     from syda_gym.embodiments.limb_ik.compiling import first_call
-    from syda_gym.teleoperation.safety.contact import looking
+    from syda_gym.simulation.collision.contact import looking
 
     return first_call, looking
 

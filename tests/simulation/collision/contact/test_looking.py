@@ -11,7 +11,7 @@ from syda_gym.embodiments import catalog
 from syda_gym.embodiments.discovery.arms import discover
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.robot import Robot
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
+from syda_gym.simulation.collision.self_collision import SelfCollision
 
 CASES = Path(__file__).parents[3] / "embodiments" / "discovery" / "cases"
 GJK = 3e-6  # m; how far coal's search may be off

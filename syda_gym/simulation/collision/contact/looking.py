@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from syda_gym.embodiments.limb_ik.compiling import compiled
-from syda_gym.teleoperation.safety.contact.solids import points_of_axes, share_of_axis, to_solid
+from syda_gym.simulation.collision.contact.solids import points_of_axes, share_of_axis, to_solid
 
 __all__ = ["measure", "near", "suspects", "touching"]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from syda_gym.teleoperation.safety.contact.solids import points_of_axes, share_of_axis, to_solid
+from syda_gym.simulation.collision.contact.solids import points_of_axes, share_of_axis, to_solid
 
 SHARES = np.linspace(-1.0, 1.0, 401)
 

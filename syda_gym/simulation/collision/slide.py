@@ -31,7 +31,7 @@ def slide(
     from scipy.optimize import nnls
 
     from syda_gym.embodiments.limb_ik.compiling import first_call
-    from syda_gym.teleoperation.safety.stepping import system
+    from syda_gym.simulation.collision.slide_kernel import system
 
     joints = len(wanted)
     matrix, scale, broken = first_call(system, wanted, low, high, gradients, slowest)

@@ -15,8 +15,8 @@ from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.kinematics.urdf import UrdfTree, configuration, read_urdf
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
-from syda_gym.teleoperation.safety.clearance import Clearance
-from syda_gym.teleoperation.safety.contact.shapes import of_model
+from syda_gym.simulation.collision.clearance import Clearance
+from syda_gym.simulation.collision.contact.shapes import of_model
 
 __all__ = ["RESERVE", "SelfCollision"]
 
@@ -475,7 +475,7 @@ def _call(name: str, *arguments: Any) -> Any:
 @lru_cache(maxsize=1)
 def _arithmetic() -> tuple[Any, Any]:
     from syda_gym.embodiments.limb_ik.compiling import first_call
-    from syda_gym.teleoperation.safety.contact import looking
+    from syda_gym.simulation.collision.contact import looking
 
     return first_call, looking
 

@@ -8,8 +8,8 @@ import pytest
 from syda_gym.embodiments import catalog
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
+from syda_gym.simulation.collision.self_collision import SelfCollision
 from syda_gym.teleoperation.loop import TeleoperationLoop
-from syda_gym.teleoperation.safety.self_collision import SelfCollision
 from syda_gym.teleoperation.tick import LoopSettings, Tick
 from tests.teleoperation.conftest import LimbMapping
 
