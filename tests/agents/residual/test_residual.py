@@ -129,7 +129,11 @@ def test_each_arm_is_paid_for_what_it_does_and_both_together_for_what_the_robot_
         for each_arm in (False, True)
     )  # fmt: skip
     assert (whole.num_envs, arms.num_envs) == (4, 8)
-    whole.reset(), arms.reset()
+    for env in (whole, arms):  # at the beginning of their episodes, where robot and shadow are one
+        env._begin_all()
+        env._episode = np.arange(4)
+        env._start(np.arange(4), np.zeros(4, dtype=np.intp))
+        env._observe()
     rng = np.random.default_rng(2)
     for _ in range(12):
         answers = rng.uniform(-1, 1, (8, interface.n // 2))
