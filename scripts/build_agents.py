@@ -2,6 +2,7 @@
 
     python scripts/study_agents.py --out study --seeds 5
     python scripts/build_agents.py --study study
+    python scripts/build_agents.py --study study --route adult pepper    # of one route only
     python scripts/build_agents.py --shipped           # chooses anew among what is shipped, without a study
 
 Candidates are the tuned rivals and the agents trained on the cell or on the full suite. Which one is best is decided in
@@ -38,8 +39,9 @@ def main() -> None:
     parser.add_argument("--study", type=Path, default=Path("study"))
     parser.add_argument("--out", type=Path, default=asset("agents"))
     parser.add_argument("--shipped", action="store_true", help="candidates are what is shipped already")
+    parser.add_argument("--route", nargs="+", default=None, help="only this one")
     given = parser.parse_args()
-    for route in ROUTES:
+    for route in ROUTES if given.route is None else [tuple(given.route)]:
         study = Study(given.study, route=route)
         found = {cell: candidates(study, cell, shipped=given.shipped) for cell in CELLS}  # before any is written
         for cell in CELLS:

@@ -12,8 +12,8 @@
 busy, flood the source with junk and stop the loop's process now and then, with an emergency stop every ten seconds or
 so; speeds and accelerations are taken from the kernel's time stamps of the packets. With ``--add`` the figures of a run
 are added to those of earlier ones, so that many commands can be had in pieces. ``people``: how many frames of real
-recordings are called implausible. ``unfamiliar``: how many frames of an action are called unfamiliar by a mapping fitted
-on the same person's others.
+recordings are called implausible. ``unfamiliar``: how many frames of an action are called unfamiliar by a mapping
+fitted on the same person's others.
 """
 
 from __future__ import annotations

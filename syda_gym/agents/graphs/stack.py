@@ -246,9 +246,10 @@ class _ResidualGraph(_Layer):
 
     def __init__(self, agent: ResidualPolicy) -> None:
         super().__init__()
-        layout = agent.interface.layout
         self.state_size = agent.interface.n
-        self.kept = [part for name, part in layout.items() if name != "previous_action"]
+        self.views = agent.views
+        self.signs, self.answer_signs = constant(agent.views.signs), constant(agent.views.answer_signs)
+        self.order = torch.as_tensor(agent.views.order)
         self.mean, self.std = constant(agent.mean), constant(agent.std)
         self.scale, self.smoothing = agent.scale, agent.smoothing
         self.activation = torch.tanh if agent.activation == "tanh" else torch.relu
@@ -261,15 +262,21 @@ class _ResidualGraph(_Layer):
 
     def forward(self, command: Tensor, parts: _Parts, state: Tensor) -> tuple[Tensor, Tensor]:
         correction = _first(parts, torch.zeros_like(command), state)
-        seen = [parts.observation[:, part] for part in self.kept]
+        seen = [parts.observation[:, part] for part in self.views.blocks]
         features = torch.cat([*seen, command - parts.q, correction], dim=1)
+        answer = self._answer(features)
+        if self.views.each_arm:
+            mirrored = self._answer(features[:, self.order] * self.signs)
+            answer = torch.cat([answer, mirrored * self.answer_signs], dim=1)
+        correction = self.smoothing * correction + (1.0 - self.smoothing) * answer
+        return command + self.scale * correction, correction
+
+    def _answer(self, features: Tensor) -> Tensor:
         hidden = ((features - self.mean) / self.std).clamp(-10.0, 10.0)
         for weight, bias in self.dense[:-1]:
             hidden = self.activation(hidden @ weight + bias)
         raw = hidden @ self.dense[-1][0] + self.dense[-1][1]
-        answer = raw.clamp(-1.0, 1.0) if self.clips else torch.tanh(raw)
-        correction = self.smoothing * correction + (1.0 - self.smoothing) * answer
-        return command + self.scale * correction, correction
+        return raw.clamp(-1.0, 1.0) if self.clips else torch.tanh(raw)
 
 
 def _first(parts: _Parts, at_first: Tensor, later: Tensor) -> Tensor:

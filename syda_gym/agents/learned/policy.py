@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from syda_gym.agents.agent import Agent
 from syda_gym.agents.interface import Interface, Reading
+from syda_gym.agents.learned.views import Views
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import AgentError
 
-__all__ = ["ResidualPolicy", "feature_count", "policy_features"]
+__all__ = ["ResidualPolicy"]
 
-_LEFT_OUT = ("previous_action",)  # the low-passed correction itself takes its place
 _FARTHEST = 10.0  # normalised features are clipped to this many standard deviations
 
 
@@ -36,6 +36,8 @@ class ResidualPolicy(Agent):
         smoothing: share of the old correction, 0 to below 1.
         activation: ``"tanh"`` or ``"relu"`` between layers.
         squash: ``"clip"`` (PPO) or ``"tanh"`` (SAC, TQC) behind the last layer.
+        each_arm: whether the network looks at each arm as if it were the left one and answers for that arm
+            (``views.Views``); otherwise it looks at the whole robot and answers for all joints.
 
     Raises:
         AgentError: weights of other shapes, or settings out of range.
@@ -55,6 +57,7 @@ class ResidualPolicy(Agent):
         smoothing: float = 0.6,
         activation: str = "tanh",
         squash: str = "clip",
+        each_arm: bool = False,
     ) -> None:
         super().__init__(interface, base)
         if not (0.0 < scale <= np.pi and 0.0 <= smoothing < 1.0):
@@ -65,21 +68,30 @@ class ResidualPolicy(Agent):
         self.activation, self.squash = activation, squash
         self.weights = dict(weights)
         self.mean, self.std = np.asarray(mean, dtype=np.float64), np.asarray(std, dtype=np.float64)
-        self._layers = _layers(weights, feature_count(interface), interface.n)
-        if self.mean.shape != (feature_count(interface),) or self.std.shape != self.mean.shape:
-            raise AgentError(f"expected a mean and a std of {feature_count(interface)} features, got {self.mean.shape}")
+        self.views = Views(interface, each_arm)
+        self._layers = _layers(weights, self.views.size, self.views.outputs)
+        if self.mean.shape != (self.views.size,) or self.std.shape != self.mean.shape:
+            raise AgentError(f"expected a mean and a std of {self.views.size} features, got {self.mean.shape}")
 
     @classmethod
     def untrained(
-        cls, interface: Interface, base: Agent, *, hidden: Sequence[int] = (64, 64), **settings: Any
+        cls,
+        interface: Interface,
+        base: Agent,
+        *,
+        hidden: Sequence[int] = (64, 64),
+        each_arm: bool = False,
+        **settings: Any,
     ) -> ResidualPolicy:
         """A policy whose weights are all zero: it does what the agent below does."""
-        sizes = [feature_count(interface), *hidden, interface.n]
+        views = Views(interface, each_arm)
+        sizes = [views.size, *hidden, views.outputs]
         weights: dict[str, NDArray[np.float32]] = {}
         for index, (inputs, outputs) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
             weights[f"layers.{index}.weight"] = np.zeros((outputs, inputs), dtype=np.float32)
             weights[f"layers.{index}.bias"] = np.zeros(outputs, dtype=np.float32)
-        return cls(interface, base, weights=weights, mean=np.zeros(sizes[0]), std=np.ones(sizes[0]), **settings)
+        normal = {"mean": np.zeros(sizes[0]), "std": np.ones(sizes[0])}
+        return cls(interface, base, weights=weights, each_arm=each_arm, **normal, **settings)
 
     def reset(self, count: int, seed: int | None = None) -> None:
         """Forgets the corrections."""
@@ -89,13 +101,12 @@ class ResidualPolicy(Agent):
     def improve(self, command: FloatArray, reading: Reading) -> FloatArray:
         """Command plus low-passed correction."""
         self._correction = np.where(self._fresh[:, None], 0.0, self._correction)
-        features = policy_features(self.interface, command, self._correction, reading)
-        answer = self.answer(features)
+        answer = self.views.join(self.answer(self.views.see(command, self._correction, reading)))
         self._correction = self.smoothing * self._correction + (1.0 - self.smoothing) * answer
         return command + self.scale * self._correction
 
     def answer(self, features: FloatArray) -> FloatArray:
-        """The network's answer ``(B, n)`` in [-1, 1] to features ``(B, F)``."""
+        """The network's answers ``(V, outputs)`` in [-1, 1] to the features of views ``(V, F)``."""
         hidden = np.clip((features - self.mean) / self.std, -_FARTHEST, _FARTHEST)
         for weight, bias in self._layers[:-1]:
             hidden = hidden @ weight.T + bias
@@ -106,35 +117,14 @@ class ResidualPolicy(Agent):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """``scale``, ``smoothing``, ``activation`` and ``squash``; weights and normalisation are stored apart."""
+        """``scale``, ``smoothing``, ``activation``, ``squash``, ``each_arm``; weights are stored apart."""
         return {
             "scale": self.scale,
             "smoothing": self.smoothing,
             "activation": self.activation,
             "squash": self.squash,
+            "each_arm": self.views.each_arm,
         }
-
-
-def policy_features(interface: Interface, command: FloatArray, correction: FloatArray, reading: Reading) -> FloatArray:
-    """What a residual policy sees, before normalisation.
-
-    Args:
-        interface: for the layout.
-        command: of the agent below ``(B, n)`` [rad].
-        correction: the low-passed correction so far ``(B, n)``, in [-1, 1].
-        reading: the decoded observation.
-
-    Returns:
-        ``(B, F)``: the observation without the previous action, the command minus the joint angles, the correction.
-    """
-    kept = [reading.observation[:, part] for name, part in interface.layout.items() if name not in _LEFT_OUT]
-    return np.concatenate([*kept, command - reading.q, correction], axis=1)
-
-
-def feature_count(interface: Interface) -> int:
-    """Number of features ``F`` of ``policy_features``."""
-    kept = [part.stop - part.start for name, part in interface.layout.items() if name not in _LEFT_OUT]
-    return int(sum(kept)) + 2 * interface.n
 
 
 def _layers(

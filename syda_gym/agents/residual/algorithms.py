@@ -30,7 +30,7 @@ def new_model(env: Any, config: ResidualConfig, seed: int, current: Callable[[],
     def learning_rate(_: float) -> float:
         # Stable-Baselines3 counts progress within one call of ``learn``; a training here has several.
         model = current()
-        done = 0.0 if model is None else model.num_timesteps / config.steps
+        done = 0.0 if model is None else model.num_timesteps / (config.steps * env.views.count)
         return config.learning_rate * max(0.0, 1.0 - done)
 
     if config.algorithm == "ppo":
@@ -62,7 +62,7 @@ def _ppo(env: Any, config: ResidualConfig, seed: int, learning_rate: Callable[[f
         env,
         learning_rate=learning_rate,
         n_steps=config.rollout,
-        batch_size=min(config.batch, config.robots * config.rollout),
+        batch_size=min(config.batch, env.num_envs * config.rollout),
         n_epochs=config.epochs,
         gamma=config.gamma,
         gae_lambda=config.gae_lambda,

@@ -47,6 +47,8 @@ class ResidualConfig:
         buffer: transitions kept (SAC, TQC).
         learning_starts: steps before the first gradient (SAC, TQC).
         hidden: widths of the layers.
+        each_arm: whether one network looks at each arm as if it were the left one, and learns from both; where the arms
+            of a robot are no mirror images, it looks at the whole robot all the same.
         scale: largest correction [rad].
         smoothing: share of the old correction, 0 to below 1.
         cost: weights of the cost whose saving is rewarded.
@@ -76,6 +78,7 @@ class ResidualConfig:
     buffer: int = 100_000
     learning_starts: int = 2_000
     hidden: tuple[int, ...] = (64, 64)
+    each_arm: bool = False
     scale: float = 0.25
     smoothing: float = 0.0
     cost: CostWeights = field(default_factory=CostWeights)

@@ -17,6 +17,7 @@ from syda_gym.agents.classical.projection import capsule_model
 from syda_gym.agents.classical.rivals import make_rival
 from syda_gym.agents.figures import Figures
 from syda_gym.agents.learned.policy import ResidualPolicy
+from syda_gym.agents.learned.views import mirror_of
 from syda_gym.agents.residual.checkpoint import load_checkpoint, restore_model, save_checkpoint
 from syda_gym.agents.residual.config import STACK, ResidualConfig
 from syda_gym.agents.residual.logs import training_logger
@@ -177,6 +178,7 @@ class _Run:
             scale=config.scale,
             smoothing=config.smoothing,
             weights=config.cost,
+            each_arm=config.each_arm and mirror_of(base.interface.robot) is not None,
         )
         self.history: list[Leg] = []
         self.snapshots: list[dict[str, NDArray[np.float32]]] = []
@@ -225,10 +227,11 @@ class _Run:
         set_random_seed(_mixed(self.seed, index))
         self.env.seed_all([self.seed, index])
         self.model._last_obs = None
-        until = round(self.config.steps * (index + 1) / self.config.legs)
+        views = self.env.views.count  # Stable-Baselines3 counts every view of a robot as an environment
+        until = views * round(self.config.steps * (index + 1) / self.config.legs)
         self.model.learn(
             max(until - self.model.num_timesteps, 1),
-            callback=_callback(progress, self.config.steps),
+            callback=_callback(progress, self.config.steps * views),
             reset_num_timesteps=False,
             log_interval=None if self.folder is None else 1,
         )
@@ -252,7 +255,7 @@ class _Run:
         self.env.reset()
         seen = [self.env.raw_features]
         for _ in range(63):
-            self.env.step(np.zeros((self.config.robots, self.env.interface.n)))
+            self.env.step(np.zeros((self.env.num_envs, self.env.views.outputs)))
             seen.append(self.env.raw_features)
         features = np.concatenate(seen)
         self.env.mean, self.env.std = features.mean(axis=0), spreads(features, self.env.interface.n)
@@ -271,7 +274,7 @@ class _Run:
         self.snapshots.append(policy_weights(self.model))
         figures = self._score(self._agent(self.snapshots[-1]))
         base = self.history[0].base if self.history else self._score(self.base)
-        self.history.append(Leg(int(self.model.num_timesteps), figures, base))
+        self.history.append(Leg(int(self.model.num_timesteps) // self.env.views.count, figures, base))
         if self.folder is not None:
             for name, value in figures.as_dict().items():
                 self.model.logger.record(f"validation/policy_{name}", value)
@@ -315,6 +318,7 @@ class _Run:
             smoothing=self.config.smoothing,
             activation="tanh" if ppo else "relu",
             squash="clip" if ppo else "tanh",
+            each_arm=self.env.views.each_arm,
         )
 
 

@@ -228,6 +228,6 @@ def _where_to_go_on(out: Path, kind: str) -> str:
     if kind == "residual" and (out / "checkpoint.safetensors").is_file():
         from syda_gym.agents.residual.checkpoint import load_checkpoint
 
-        steps = load_checkpoint(out / "checkpoint.safetensors")[1]["steps"]
+        steps = load_checkpoint(out / "checkpoint.safetensors")[1]["state"]["history"][-1]["steps"]
         return f"the checkpoint in {out} stands at {steps} steps; the same command with --resume goes on from there"
     return "nothing was kept yet; run the command again"

@@ -116,7 +116,7 @@ class Pace:
         return result
 
     def tempering(self, most: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What a wire that is not punctual leaves of a step: a velocity that it must not fall below, and a greatest speed.
+        """What a wire that is not punctual leaves of a step: a velocity not to fall below, and a greatest speed.
 
         Below the first, joints ``(n,)`` [rad/s] would brake harder than ``most`` ``(n,)`` [rad/s^2] by what the wire
         sees. Faster than the second ``(n,)`` [rad/s], a late command would do harm.

@@ -17,6 +17,7 @@ from syda_gym.agents.stacks import stack_spec
 from syda_gym.agents.streams.streams import play_streams, read_stream
 from syda_gym.errors import AgentError, MissingExtraError, StorageError
 from syda_gym.files import asset, read_json
+from tests.agents.residual.test_residual import random_policy
 from tests.agents.test_bundle import deep_stack
 
 pytest.importorskip("onnxruntime", reason="SKIPPED LOUDLY: the extra 'export' is not installed")
@@ -31,9 +32,14 @@ def observations(agent, ground, steps=60):
     return np.stack([read_stream(ground.interface, streams, t, before[:, t], still).observation for t in range(steps)])
 
 
-@pytest.mark.parametrize("name", ["base", "lead", "ema_lead", "one_euro", "one_euro_lead", "kalman", "deep"])
+@pytest.mark.parametrize(
+    "name", ["base", "lead", "ema_lead", "one_euro", "one_euro_lead", "kalman", "deep", "each arm"]
+)
 def test_a_graph_commands_what_its_agent_commands(name, ground, tmp_path):
-    agent = deep_stack(ground.interface) if name == "deep" else make_rival(name, ground.interface)
+    if name == "each arm":
+        agent = random_policy(ground.interface, make_rival("kalman", ground.interface), size=0.3, each_arm=True)
+    else:
+        agent = deep_stack(ground.interface) if name == "deep" else make_rival(name, ground.interface)
     exported = OnnxAgent(export_onnx(agent, tmp_path / "agent.onnx"))
     assert agent_parity(agent, exported, observations(agent, ground)) < 1e-9
     assert exported.about["interface"]["robot"]["name"] == "pepper"

@@ -9,8 +9,10 @@ import pytest
 
 from syda_gym.agents.agent import BaseAlone
 from syda_gym.agents.classical.rivals import make_rival
-from syda_gym.agents.learned.policy import ResidualPolicy, feature_count
+from syda_gym.agents.learned.policy import ResidualPolicy
+from syda_gym.agents.learned.views import Views
 from syda_gym.agents.residual.config import ResidualConfig, preset_names
+from syda_gym.agents.residual.costs import CostWeights
 from syda_gym.agents.residual.env import ResidualVecEnv
 from syda_gym.agents.residual.residual_training import train_residual
 from syda_gym.agents.streams.ground import Ground
@@ -28,7 +30,7 @@ def random_policy(interface, base, seed=0, size=3.0, **settings):
     policy.weights = {
         name: rng.normal(0, size, value.shape).astype(np.float32) for name, value in policy.weights.items()
     }
-    features = feature_count(interface)
+    features = policy.views.size
     return ResidualPolicy(
         interface, base, weights=policy.weights, mean=np.zeros(features), std=np.ones(features), **settings
     )
@@ -69,17 +71,18 @@ def test_the_correction_is_low_passed(ground):
         previous = policy._correction.copy()
 
 
+@pytest.mark.parametrize("each_arm", [False, True])
 @pytest.mark.parametrize("seen", [{}, {"preview": 2, "history": 2}])
-def test_the_training_environment_plays_a_policy_as_the_agent_itself_does(tiny_options, seen):
+def test_the_training_environment_plays_a_policy_as_the_agent_itself_does(tiny_options, seen, each_arm):
     ground = Ground({**tiny_options, **seen})
     streams = ground.record(3, seed=5)
     interface = ground.interface
     for name in ("base", "kalman"):
-        policy = random_policy(interface, make_rival(name, interface), size=0.03, smoothing=0.5)
+        policy = random_policy(interface, make_rival(name, interface), size=0.03, smoothing=0.5, each_arm=each_arm)
         expected = play_streams(policy, streams, ground.rates)
         env = ResidualVecEnv(
             make_rival(name, interface), streams, ground.rates,
-            count=3, scale=policy.scale, smoothing=policy.smoothing, weights=TINY.cost,
+            count=3, scale=policy.scale, smoothing=policy.smoothing, weights=TINY.cost, each_arm=each_arm,
         )  # fmt: skip
         env._begin_all()
         env._episode = np.arange(3)
@@ -113,6 +116,34 @@ def test_no_correction_earns_nothing_and_a_shadow_of_the_reference_earns(ground)
         _, reward, _, _ = env.step(np.clip((reference - env._below) / 0.25, -1, 1))
         earned += reward.mean()
     assert earned > 0.0
+
+
+@pytest.mark.parametrize("cost", [TINY.cost, CostWeights(jitter=3.0, contact=5.0)])
+def test_each_arm_is_paid_for_what_it_does_and_both_together_for_what_the_robot_does(ground, cost):
+    streams, interface = ground.record(4, seed=6), ground.interface
+    whole, arms = (
+        ResidualVecEnv(
+            make_rival("kalman", interface), streams, ground.rates,
+            count=4, scale=0.25, smoothing=0.3, weights=cost, each_arm=each_arm,
+        )
+        for each_arm in (False, True)
+    )  # fmt: skip
+    assert (whole.num_envs, arms.num_envs) == (4, 8)
+    for env in (whole, arms):  # at the beginning of their episodes, where robot and shadow are one
+        env._begin_all()
+        env._episode = np.arange(4)
+        env._start(np.arange(4), np.zeros(4, dtype=np.intp))
+        env._observe()
+    rng = np.random.default_rng(2)
+    for _ in range(12):
+        answers = rng.uniform(-1, 1, (8, interface.n // 2))
+        answers[4:6] = 0.0  # the right arms of the first two robots do what the base does
+        _, paid, _, _ = whole.step(arms.views.join(answers))
+        _, paid_arms, _, _ = arms.step(answers)
+        assert np.allclose(paid_arms.reshape(2, 4).mean(axis=0), paid, atol=1e-5)
+        if not cost.contact:
+            assert np.allclose(paid_arms[4:6], 0.0, atol=1e-6)
+            assert (np.abs(paid_arms[:2]) > 1e-4).all()
 
 
 def test_no_feature_saturates_once_the_policy_corrects(ground):
@@ -149,7 +180,7 @@ def test_same_seed_same_weights_bit_for_bit(ground):
 def test_a_resumed_training_equals_an_uninterrupted_one_bit_for_bit(ground, tmp_path):
     from syda_gym.agents.residual.checkpoint import load_checkpoint
 
-    config = ResidualConfig.of({**TINY.as_dict(), "legs": 3, "steps": 1536})
+    config = ResidualConfig.of({**TINY.as_dict(), "legs": 3, "steps": 1536, "each_arm": True})
     whole = train_residual(ground, config, seed=1, folder=tmp_path / "whole")
 
     class StopError(Exception):
@@ -164,6 +195,7 @@ def test_a_resumed_training_equals_an_uninterrupted_one_bit_for_bit(ground, tmp_
     resumed = train_residual(ground, config, seed=1, folder=tmp_path / "cut", resume=True)
     assert resumed.history == whole.history
     assert resumed.best == whole.best
+    assert [leg.steps for leg in whole.history] == [0, 512, 1024, 1536]  # of robots, not of arms
     assert _equal(resumed.agent, whole.agent)
     first, second = (load_checkpoint(tmp_path / name / "checkpoint.safetensors") for name in ("whole", "cut"))
     assert first[1] == second[1]
@@ -245,7 +277,7 @@ def test_a_missing_extra_names_itself(ground, monkeypatch):
 
 
 def test_wrong_weights_are_refused(interface):
-    features = feature_count(interface)
+    features = Views(interface, False).size
     with pytest.raises(AgentError, match=r"layers\.0\.weight"):
         ResidualPolicy(interface, BaseAlone(interface), weights={}, mean=np.zeros(features), std=np.ones(features))
     policy = ResidualPolicy.untrained(interface, BaseAlone(interface))
