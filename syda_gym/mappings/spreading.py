@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from syda_gym.embodiments.embodiment import FloatArray
@@ -27,7 +29,6 @@ def spread_out(rows: FloatArray, count: int) -> FloatArray:
     if len(rows) > _MOST:
         rows = rows[:: -(-len(rows) // _MOST)]
     first = int(np.argmin(np.sum((rows - rows.mean(axis=0)) ** 2, axis=1)))
-    chosen: FloatArray = rows[
-        farthest(np.ascontiguousarray(rows, dtype=np.float64), first, min(count, len(rows)), _SAME)
-    ]
+    loop: Any = farthest  # compiled by numba, which has no types
+    chosen: FloatArray = rows[loop(np.ascontiguousarray(rows, dtype=np.float64), first, min(count, len(rows)), _SAME)]
     return chosen

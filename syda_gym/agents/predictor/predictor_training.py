@@ -321,7 +321,7 @@ def _motor_shares(streams: Streams, rates: Rates, config: PredictorConfig) -> Fl
     nominal = rates.lag_share
     factor = 1.0 + config.strength * (1.0 / nominal - 1.0)
     steps = streams.base.shape[1] if any(plan.changes for plan in streams.motors) else 1
-    gains = np.array([plan.gains(steps) for plan in streams.motors] or [[1.0]] * len(streams))
+    gains = np.array([plan.gains(steps) for plan in streams.motors] or [np.ones(1)] * len(streams))
     return np.asarray(factor * lag_share(rates.motor_gain * gains, rates.substeps))
 
 

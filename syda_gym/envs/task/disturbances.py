@@ -228,7 +228,7 @@ class Disturbances:
         shares = rng.random(_SHARES)
         seed = int(shares[-1] * 2**53)
         last = float(np.random.default_rng(seed).random()) if high[-1] > low[-1] else 0.0
-        return Drawn(*(low + np.append(shares, last) * (high - low)).tolist(), seed_of_changes=seed + 1)
+        return Drawn(*(low + np.append(shares, last) * (high - low)).tolist(), seed + 1)
 
     @cached_property
     def _bounds(self) -> tuple[FloatArray, FloatArray]:
