@@ -84,7 +84,7 @@ PERSON: dict[str, Colour] = {
 """What the figure of a person wears."""
 
 
-def plot_theme(ground: str = "day") -> dict[str, Any]:
+def plot_theme(ground: str = "day") -> dict[Any, Any]:
     """Matplotlib's settings for plots.
 
     Args:

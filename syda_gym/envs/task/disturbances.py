@@ -8,7 +8,7 @@ The preset ``teleop`` is the standard suite at 30 Hz: cells ``lag``, ``noise``, 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -228,7 +228,8 @@ class Disturbances:
         shares = rng.random(_SHARES)
         seed = int(shares[-1] * 2**53)
         last = float(np.random.default_rng(seed).random()) if high[-1] > low[-1] else 0.0
-        return Drawn(*(low + np.append(shares, last) * (high - low)).tolist(), seed + 1)
+        values: list[Any] = (low + np.append(shares, last) * (high - low)).tolist()
+        return replace(Drawn(*values), seed_of_changes=seed + 1)
 
     @cached_property
     def _bounds(self) -> tuple[FloatArray, FloatArray]:
