@@ -84,7 +84,7 @@ PERSON: dict[str, Colour] = {
 """What the figure of a person wears."""
 
 
-def plot_theme(ground: str = "day") -> dict[str, Any]:
+def plot_theme(ground: str = "day") -> Any:
     """Matplotlib's settings for plots.
 
     Args:
@@ -92,7 +92,7 @@ def plot_theme(ground: str = "day") -> dict[str, Any]:
             can be read on white and on black.
 
     Returns:
-        What ``matplotlib.rc_context`` takes.
+        A dictionary as ``matplotlib.rc_context`` takes it.
     """
     if ground == "day":
         return {"figure.facecolor": "white"}

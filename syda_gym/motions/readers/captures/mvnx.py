@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -91,7 +92,7 @@ def read_mvnx(path: str | Path, said: Said = NOTHING_SAID) -> Motions:
 
 def _subjects(file: Path, content: bytes) -> list[_Subject]:
     """Every subject; elements are forgotten as soon as they are read."""
-    parser = ElementTree.XMLPullParser(("start", "end"))
+    parser: Any = ElementTree.XMLPullParser(("start", "end"))
     subjects: list[_Subject] = []
     kind = ""
     try:
