@@ -92,7 +92,7 @@ def plot_theme(ground: str = "day") -> dict[Any, Any]:
             can be read on white and on black.
 
     Returns:
-        What ``matplotlib.rc_context`` takes.
+        A dictionary as ``matplotlib.rc_context`` takes it.
     """
     if ground == "day":
         return {"figure.facecolor": "white"}

@@ -37,6 +37,7 @@ PARSED = {
     "syda-gym fit": "needs recordings of a person; tests/routes/piloting",
     "syda-gym motions info lab.txt": "needs a recording of a format of one's own; tests/motions/readers",
     "syda-gym motions info lab.csv": "needs a recording of a format of one's own; tests/motions/readers",
+    "syda-gym teleop --source replay:lab.csv": "needs a file of one's own; tests/cli/groups/test_reading.py",
     "syda-gym record": "needs a person; tests/teleoperation/setup",
     "syda-gym motions pair": "needs recordings of a person; tests/motions/pairing",
     "syda-gym teleop --source camera --view": "needs a camera; tests/teleoperation/incoming/test_camera.py",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from syda_gym.cli import checks
+from syda_gym.cli.groups.reading import Reading, with_reading
 from syda_gym.cli.options import (
     DEFAULT_VIEW,
     ActionOption,
@@ -35,7 +36,6 @@ from syda_gym.cli.options import (
     mapping_of,
     route_of,
 )
-from syda_gym.cli.reading import Reading, with_reading
 from syda_gym.cli.shared import console, say_written, show_table
 from syda_gym.cli.spellings import Program
 

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from syda_gym.cli import checks
+from syda_gym.cli.groups.reading import Reading, with_reading
 from syda_gym.cli.options import (
     DEFAULT_VIEW,
     JsonOption,
@@ -18,7 +19,6 @@ from syda_gym.cli.options import (
     ViewAddressOption,
     ViewOption,
 )
-from syda_gym.cli.reading import Reading, with_reading
 from syda_gym.cli.shared import console, print_json, say_written, show_table
 from syda_gym.cli.spellings import Program
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from syda_gym.cli import checks
+from syda_gym.cli.groups.reading import Reading, with_reading
 from syda_gym.cli.names import PREDICTORS, ticked
 from syda_gym.cli.options import (
     BodiesArgument,
@@ -25,7 +26,6 @@ from syda_gym.cli.options import (
     pairs_of,
     sensors_of,
 )
-from syda_gym.cli.reading import Reading, with_reading
 from syda_gym.cli.shared import interruptible, print_json, print_table, stages
 
 if TYPE_CHECKING:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -93,7 +94,9 @@ def teleoperate(
     sink = sinks if isinstance(sinks, Sink) else make_sink(
         sinks, probe.robot, token=token, rate=chosen.rate, operator=mapping.source
     )  # fmt: skip
-    with sink:
+    with sink, ExitStack() as stack:
+        made.hold()  # what cannot be opened is one line, before a page or a table is shown
+        stack.callback(made.close)
         # A run begins where the robot's joints are rather than with a jump.
         start = sink.angles()
         loop = probe if start is None else TeleoperationLoop(mapping, chosen, start)

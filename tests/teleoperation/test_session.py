@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from syda_gym.cli.main import app
 from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
-from syda_gym.errors import MotionError, OptionError, TeleoperationError
+from syda_gym.errors import MotionError, OptionError, SydaError, TeleoperationError
 from syda_gym.routes.piloting.choice import choose_mapping
 from syda_gym.teleoperation.addresses import make_sink, make_source, read_token
 from syda_gym.teleoperation.incoming.network import UdpSource, WebSocketSource
@@ -195,8 +196,6 @@ def test_keys_become_requests(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_command_line_runs_journals_and_checks(tmp_path: Path) -> None:
-    from syda_gym.cli.main import app
-
     journal = tmp_path / "run.jsonl"
     common = ["teleop", "--method", "geometric"]
     live = ["--sink", "none", "--action", "wave_high", "--calibration", "0.5", "--speed", "3"]
@@ -243,3 +242,37 @@ def test_the_command_line_records_a_pair(tmp_path: Path) -> None:
     assert "mimic the robot now" in result.output
     assert "wave_high" in result.output
     assert len(read_dataset(out).pair("adult", "pepper")) > 40
+
+
+def test_a_source_that_cannot_be_opened_is_said_before_anything_is_shown(
+    adult: HumanSkeleton, pepper: Robot, tmp_path: Path
+) -> None:
+    """No page is opened, no table drawn, no journal begun for a run that cannot be."""
+    begun: list[Session] = []
+    journal = tmp_path / "run.jsonl"
+    source = UdpSource(adult, "127.0.0.1", 0)
+    source.hold()
+    taken = UdpSource(adult, "127.0.0.1", source.port)
+    with source, pytest.raises(TeleoperationError, match=str(source.port)):
+        teleoperate(LimbMapping(adult, pepper), taken, MemorySink(), journal=journal, on_start=begun.append)
+    assert not begun
+    assert not journal.exists()
+    done = CliRunner(env={"COLUMNS": "200"}).invoke(
+        app, ["teleop", "--method", "geometric", "--source", "camera:97", "--sink", "none"]
+    )
+    assert isinstance(done.exception, SydaError)
+    assert "latency" not in done.output
+
+
+def test_a_source_is_held_once_and_freed_in_any_case(adult: HumanSkeleton, pepper: Robot) -> None:
+    source = UdpSource(adult, "127.0.0.1", 0)
+
+    def fails(_: Session) -> None:
+        raise RuntimeError("the page")
+
+    with pytest.raises(RuntimeError, match="the page"):
+        teleoperate(LimbMapping(adult, pepper), source, MemorySink(), on_start=fails)
+    again = UdpSource(adult, "127.0.0.1", source.port)
+    again.hold()
+    again.hold()
+    again.close()

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from syda_gym.cli import checks
+from syda_gym.cli.groups.expanding import with_group
+from syda_gym.cli.groups.reading import Reading
 from syda_gym.cli.names import REFERENCES
-from syda_gym.cli.option_groups import with_group
 from syda_gym.cli.options import (
     DisturbancesOption,
     HeldOutOption,
@@ -26,7 +27,6 @@ from syda_gym.cli.options import (
     mapping_of,
     route_of,
 )
-from syda_gym.cli.reading import Reading
 
 if TYPE_CHECKING:
     from syda_gym.motions import Motions

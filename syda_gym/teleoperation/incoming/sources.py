@@ -34,8 +34,24 @@ class Source:
         self.clock = clock
         self._news: list[str] = []
         self._ending = threading.Event()
+        self._held = False
         self._started = False
         self._thread: threading.Thread | None = None
+
+    def hold(self) -> None:
+        """Takes hold of the address without delivering yet, so that what is wrong with it is known; repeated, nothing.
+
+        Raises:
+            TeleoperationError: the address cannot be used.
+        """
+        if self._held:
+            return
+        try:
+            self._open()
+        except BaseException:
+            self._shut()  # what was opened before the failure, a model for example
+            raise
+        self._held = True
 
     def start(self) -> None:
         """Begins to deliver.
@@ -45,7 +61,7 @@ class Source:
         """
         if self._started:
             raise TeleoperationError(f"{type(self).__name__} was started already; make a new one")
-        self._open()
+        self.hold()
         self._started = True
         self._begin()
 

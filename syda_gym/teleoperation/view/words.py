@@ -77,6 +77,7 @@ def _ms(value: float) -> str:
 
 def _plain(text: str) -> str:
     """Text without what Markdown would take for its own; names come from files and packets."""
+    text = text.replace(" > ", " to ")  # of routes
     for sign in "\\`*_{}[]<>#|$":
         text = text.replace(sign, " " if sign in "`{}[]<>#|$\\" else f"\\{sign}")
     return text

@@ -154,6 +154,8 @@ class TestPage:
         text = status_text(loop, source, stats, decision, decision.reasons, "")
         assert "<" not in text
         assert "[" not in text
+        route = decided(reasons=("mapping: adult > pepper",))
+        assert "adult to pepper" in status_text(loop, source, stats, route, route.reasons, "")
 
     def test_beyond_this_machine_a_token_is_asked_for(self, tmp_path: Path) -> None:
         with pytest.raises(OptionError, match="token"):

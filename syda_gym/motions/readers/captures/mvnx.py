@@ -92,7 +92,7 @@ def read_mvnx(path: str | Path, said: Said = NOTHING_SAID) -> Motions:
 
 def _subjects(file: Path, content: bytes) -> list[_Subject]:
     """Every subject; elements are forgotten as soon as they are read."""
-    parser: Any = ElementTree.XMLPullParser(("start", "end"))  # Any: the stub allows for namespaces, which do not come
+    parser: Any = ElementTree.XMLPullParser(("start", "end"))
     subjects: list[_Subject] = []
     kind = ""
     try:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from syda_gym.cli.option_groups import with_group
+from syda_gym.cli.groups.expanding import with_group
 from syda_gym.cli.options import FpsOption, JointsOption, LayoutOption, PersonOption, UnitOption, UpOption
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from syda_gym.cli.acting.scene import Scene
+from syda_gym.cli.groups.reading import Reading
 from syda_gym.cli.main import app
-from syda_gym.cli.reading import Reading
 from syda_gym.embodiments import catalog
 from syda_gym.errors import MotionError
 from syda_gym.motions import HowToRead, Motions, generate, load_motions, save_motions
