@@ -216,12 +216,12 @@ def report(out: Path, seeds: int) -> None:
         "test_motions": rows,
     }
     write_json(out / "table.json", result)
-    print(f"| agent | landmark error [mm] | joint error [mrad] | jitter | J | of {best} |")
-    print("|---|---|---|---|---|---|")
+    print(f"| agent | landmark error [mm] | joint error [mrad] | jitter | J | of {best} | median over motions |")
+    print("|---|---|---|---|---|---|---|")
     for name, row in table.items():
         print(
             f"| {name} | {row['landmark_mm']:.2f} | {row['joint_mrad']:.2f} | {row['jitter']:.2f} | {row['J']:.2f} | "
-            f"{row['ratio']:.3f} ({row['ratio_low']:.3f} to {row['ratio_high']:.3f}) |"
+            f"{row['ratio']:.3f} ({row['ratio_low']:.3f} to {row['ratio_high']:.3f}) | {row['median_ratio']:.3f} |"
         )
 
 
@@ -238,7 +238,8 @@ def _summary(found: list[dict[str, Any]], rival: list[dict[str, Any]]) -> dict[s
     draws = rng.integers(len(motions), size=(2000, len(motions)))
     low, high = np.quantile(mine[draws].mean(axis=1) / theirs[draws].mean(axis=1), (0.025, 0.975))
     ratio = float(mine.mean() / theirs.mean())
-    return {**means, "ratio": ratio, "ratio_low": float(low), "ratio_high": float(high)}
+    median = float(np.median(mine / theirs))
+    return {**means, "ratio": ratio, "ratio_low": float(low), "ratio_high": float(high), "median_ratio": median}
 
 
 def main() -> None:

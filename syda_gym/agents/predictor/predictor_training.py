@@ -20,6 +20,7 @@ from syda_gym.agents.predictor.contact_term import ContactTerm
 from syda_gym.agents.streams.streams import Streams, play_streams, read_stream, score_streams
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.errors import AgentError
+from syda_gym.simulation.motor_plan import MotorPlan
 from syda_gym.simulation.rates import Rates
 
 if TYPE_CHECKING:
@@ -321,7 +322,8 @@ def _motor_shares(streams: Streams, rates: Rates, config: PredictorConfig) -> Fl
     nominal = rates.lag_share
     factor = 1.0 + config.strength * (1.0 / nominal - 1.0)
     steps = streams.base.shape[1] if any(plan.changes for plan in streams.motors) else 1
-    gains = np.array([plan.gains(steps) for plan in streams.motors] or [np.ones(1)] * len(streams))
+    plans = streams.motors or (MotorPlan(),) * len(streams)
+    gains = np.array([plan.gains(steps) for plan in plans])
     return np.asarray(factor * lag_share(rates.motor_gain * gains, rates.substeps))
 
 

@@ -40,9 +40,7 @@ def motor_plan(disturbed: Disturbances, drawn: Drawn, steps: int, dt: float) -> 
         shares = rng.random(2)
         if step >= steps:
             return MotorPlan(tuple(conditions), tuple(at))
-        fresh: dict[str, Any] = {
-            name: disturbed.at_share(name, float(share)) for name, share in zip(group, shares, strict=False)
-        }
+        fresh: dict[str, Any] = {n: disturbed.at_share(n, s) for n, s in zip(group, shares.tolist(), strict=False)}
         now = replace(now, **fresh)
         if step == at[-1]:
             conditions[-1] = now.motors

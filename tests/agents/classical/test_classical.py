@@ -201,7 +201,7 @@ def test_wrong_use_says_what_to_do(interface):
     with pytest.raises(AgentError, match="takes the settings strength"):
         make_rival("lead", interface, speed=3)
     with pytest.raises(AgentError, match="strength must lie between"):
-        make_rival("lead", interface, strength=2.0)
+        make_rival("lead", interface, strength=2.5)
 
 
 def test_an_interface_of_another_robot_layout_or_rate_is_refused(interface):

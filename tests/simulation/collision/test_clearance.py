@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 
 from syda_gym.embodiments import catalog
-from syda_gym.embodiments.human import HumanSkeleton
 from syda_gym.embodiments.robot import Robot
 from syda_gym.simulation.collision.self_collision import SelfCollision
-from syda_gym.teleoperation.loop import TeleoperationLoop
-from syda_gym.teleoperation.tick import LoopSettings, Tick
-from tests.teleoperation.conftest import LimbMapping
 
 
 @pytest.mark.parametrize("name", ["pepper", "nao"])
@@ -34,17 +30,3 @@ def test_answers_are_the_same_with_and_without_a_measurement(name: str) -> None:
         pose = robot.clamp(pose + rng.normal(scale=0.2, size=pose.shape))[0]
     assert touching > 30, "some of these poses do touch"
     assert spared > 100, "often there is nothing to look at"
-
-
-def test_settling_changes_no_bit(mapping: LimbMapping, adult: HumanSkeleton, pepper: Robot) -> None:
-    settings = LoopSettings(calibration=0.0, cutoff=0.0)
-    loops, rng, held = [TeleoperationLoop(mapping, settings) for _ in range(2)], np.random.default_rng(2), 0
-    for index in range(200):
-        if index % 4 == 0:
-            mapping.fixed = pepper.clamp(rng.uniform(pepper.lower, pepper.upper))[0]
-        settled, plain = (loop.step(Tick(index / 30, adult.standing())) for loop in loops)
-        loops[0].settle()
-        assert settled.command.tobytes() == plain.command.tobytes()
-        assert settled.reasons == plain.reasons
-        held += "self-collision: held back" in plain.reasons
-    assert held > 5, "some of these poses do touch"
