@@ -63,7 +63,7 @@ def _braking(distance, most, delay):
 
 @compiled
 def intention(bounds, state, target, dt, change, factor):
-    """Least and greatest velocity that speed, acceleration and jerk permit, and the wanted one within them ``(3, n)``.
+    """Least and greatest velocity that speed, acceleration, jerk and limits ahead permit, and the wanted one (3, n).
 
     The wanted velocity arrives at the target as soon as possible and does not overshoot it. Rows of ``state``: the last
     command, its velocity and acceleration, the target's velocity.
@@ -92,7 +92,8 @@ def intention(bounds, state, target, dt, change, factor):
         wanted = _clipped(way / dt, drift - reach, drift + reach)
         below = _braking(max(command - lower, 0.0), most, dt)
         above = _braking(max(upper - command, 0.0), most, dt)
-        result[0, j], result[1, j] = low, high
+        # What slides must be able to stop before a limit, too.
+        result[0, j], result[1, j] = _clipped(-below, low, high), _clipped(above, low, high)
         result[2, j] = _clipped(_clipped(wanted, -below, above), low, high)
     return result
 
