@@ -2,7 +2,8 @@
 
     python scripts/benchmark_teleoperation.py latency --frames 10000 --rate 30
     python scripts/benchmark_teleoperation.py throughput
-    python scripts/benchmark_teleoperation.py timing            both, with 3000 frames: below three minutes
+    python scripts/benchmark_teleoperation.py timing            both, with 3000 frames: below three minutes; prints
+                                                                the lines of docs/live.md
     python scripts/benchmark_teleoperation.py violations --data FOLDER
     python scripts/benchmark_teleoperation.py network --hours 1
     python scripts/benchmark_teleoperation.py fuzz --inputs 1000000
@@ -72,9 +73,39 @@ def main() -> None:
     asked = ["throughput", "latency"] if args.part == "timing" else [args.part]
     result = {part: parts[part](args) for part in asked}
     print(json.dumps(result, indent=1))
+    if args.part == "timing":
+        print(page(result["throughput"], result["latency"]))
     if args.out is not None:
         before = read_json(args.out) if args.out.exists() else {}
         write_json(args.out, {**before, **result})
+
+
+def page(steps: dict[str, Any], wire: dict[str, Any]) -> str:
+    """The table and the paragraph of docs/live.md."""
+    titles = {
+        "syda adult>pepper": "SyDa, adult to Pepper",
+        "syda adult>kid>pepper": "SyDa, chain over the kid",
+        "geometric": "geometric",
+        "mink": "mink IK in the same loop",
+    }
+    lines = [
+        "| mapping | frames per second | median [ms] | free / held back [ms] | 99 % [ms] | times mink |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, title in titles.items():
+        row = steps[name]
+        times = f"{row['times_mink']:.1f}" if "times_mink" in row else ""
+        lines.append(
+            f"| {title} | {row['frames_per_second']:.0f} | {row['p50_ms']:.2f} | {row['p50_free_ms']:.2f} / "
+            f"{row['p50_held_back_ms']:.2f} | {row['p99_ms']:.2f} | {times} |"
+        )
+    lines.append(
+        f"\nUDP to UDP over loopback in real time at 30 Hz, {wire['frames']} frames acted on, load average "
+        f"{wire['load_average']:.1f}: median {wire['latency_p50_ms']:.2f} ms, 90 % {wire['latency_p90_ms']:.2f} ms, "
+        f"99 % {wire['latency_p99_ms']:.2f} ms, worst {wire['latency_max_ms']:.0f} ms; from the sending of a frame to "
+        f"its command back at the sender {wire['round_trip_p50_ms']:.2f} ms in the middle."
+    )
+    return "\n".join(lines)
 
 
 def chosen(args: argparse.Namespace) -> Mapping:

@@ -14,15 +14,16 @@ from syda_gym.teleoperation.safety.limiter import CommandLimiter
 __all__ = ["Detour"]
 
 _STEP = 0.05  # rad; how far apart the looked-at poses of a line are
-_LOOKS = 24  # poses that are looked at in one step of the loop, about a millisecond
+_LOOKS = 60  # poses that are looked at in one step of the loop, about a millisecond
 
 
 class Detour:
     """Looks for straight lines in joint space, one after the other, that lead to a pose.
 
     Tried in this order: straight there; one arm after the other; over rest; each arm over rest while the other waits;
-    back along the way that the robot came and from one of its corners straight there or over rest. Whatever was free
-    when the robot set out is found, because where it set out from is one of the corners.
+    straight to a corner of the way that the robot came, or back along that way, and from there straight on; back along
+    it and over rest. Whatever was free when the robot set out is found, because where it set out from is one of the
+    corners.
 
     The search is spread over steps of the loop by a count of poses, not by time, so that a journal decides alike.
 
@@ -98,6 +99,7 @@ class Detour:
         back: list[FloatArray] = []
         for corner in reversed(self._trail):
             back.append(corner)
+            yield [corner, goal]  # without the corners between, at which the robot would stop
             yield [*back, goal]
         for count in range(1, len(back) + 1, 4):
             yield [*back[:count], rest, goal]

@@ -21,7 +21,7 @@ from syda_gym.teleoperation.safety.punctuality import GENTLE
 __all__ = ["Motion", "Moved"]
 
 _STANDING = 1e-9  # rad/s
-_ROUNDING = 1e-9  # rad
+_GENTLE = 0.005  # rad; a way to a standstill that is no longer is known rather than foreseen
 _DAMPING = 8.0  # 1/s; share of a pair's distance by which it may shrink in a second
 _NEAR = 0.08  # m; pairs further apart do not take part in sliding
 _SAME_GOAL = 0.2  # rad; a target that moves less is the same one, with noise
@@ -193,7 +193,6 @@ class Motion:
         poses, allowed = self._ahead(velocity)
         if not allowed or (self._collision is not None and not self._free(poses)):
             return False
-        self._step = poses[0] - self.command
         self._arrive(poses[0].copy())
         self._in_line = False
         return True
@@ -206,11 +205,12 @@ class Motion:
             return True
         if self._overlaps:
             return self._comes_apart(poses[0])
-        if check.free(poses, suspects, reserve=True):
-            return True
-        # Where the robot stands nearer than the reserve already, the margin alone counts.
-        if check.free(self.command[None], suspects, reserve=True):
-            return False
+        if _apart(poses[0], poses[-1]) > _GENTLE:
+            if check.free(poses, suspects, reserve=True):
+                return True
+            # Where the robot stands nearer than the reserve already, the margin alone counts.
+            if check.free(self.command[None], suspects, reserve=True):
+                return False
         return check.free(poses, suspects)
 
     def _comes_apart(self, end: FloatArray) -> bool:
@@ -243,13 +243,16 @@ class Motion:
 
     def _go(self, velocity: FloatArray) -> None:
         end = self._end(velocity)
-        if not self._limiter.allows(end):  # rounding at the edge of a coupled limit
-            inside = self._limiter.start(end)
-            end = inside if float(np.abs(inside - end).max()) < _ROUNDING else self.command
-        self._step = end - self.command
-        self._arrive(end)
+        if not self._settle(end):  # the way there was looked at here and there: between, an edge of a coupled limit
+            end = self._limiter.couple(self.command, end, self._limiter.speed * self._pace.dt)
+        self._arrive(end if self._settle(end) else self.command)
+
+    def _settle(self, pose: FloatArray) -> bool:
+        """Whether limits allow a pose, which is freed from rounding in place."""
+        return bool(_call("settle", self._bounds, pose[None], 0))
 
     def _arrive(self, end: FloatArray) -> None:
+        self._step = end - self.command
         self.command = end
         if self._overlaps and self._step.any():
             assert self._collision is not None
@@ -317,16 +320,15 @@ class Motion:
         wanted = min(float(braking_speed(np.array(length), np.array(most), self._pace.dt)), length / self._pace.dt)
         speed = min(max(wanted, slow), fast)
         velocity = unit * speed
-        end = corner if speed * self._pace.dt >= length * (1.0 - 1e-12) else self._end(velocity)
+        end = corner.copy() if speed * self._pace.dt >= length * (1.0 - 1e-12) else self._end(velocity)
         off = self._pace.velocity - unit * float(self._pace.velocity @ unit / (unit @ unit))
         free = self._collision is None or self._collision.free(end[None], self._collision.suspects(self.command, end))
-        if slow > fast or float(np.abs(off).max()) > 1e-6 or not free or not self._limiter.allows(end):
+        if slow > fast or float(np.abs(off).max()) > 1e-6 or not free or not self._settle(end):
             self._go(self._braked())
             if self.standing:
                 self._way = []
             return Moved(True, True)
-        self._step = end - self.command
-        self.command = end
+        self._arrive(end)
         self._in_line = True
         return Moved(False, True)
 

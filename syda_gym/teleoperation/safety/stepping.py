@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from syda_gym.embodiments.embodiment import FloatArray
 from syda_gym.embodiments.limb_ik.compiling import compiled
 
-__all__ = ["Bounds", "ahead", "apart", "drifted", "intention"]
+__all__ = ["Bounds", "ahead", "apart", "drifted", "intention", "settle"]
 
-_LOOK = 0.1  # rad; how far apart the looked-at poses of a way to a standstill are
+_LOOK = 0.02  # rad; how far apart the looked-at poses of a way to a standstill are
 _SLACK = 1e-12  # rad; by which coupled limits may be missed through rounding
 
 
@@ -62,7 +62,7 @@ def _braking(distance, most, delay):
 
 @compiled
 def intention(bounds, state, target, dt, change, factor):
-    """Least and greatest velocity that speed, acceleration and jerk permit, and the wanted one within them ``(3, n)``.
+    """Least and greatest velocity that speed, acceleration, jerk and limits ahead permit, and the wanted one (3, n).
 
     The wanted velocity arrives at the target as soon as possible and does not overshoot it. Rows of ``state``: the last
     command, its velocity and acceleration, the target's velocity, and the two of ``Pace.tempering``.
@@ -99,33 +99,42 @@ def intention(bounds, state, target, dt, change, factor):
         wanted = _clipped(way / dt, drift - reach, drift + reach)
         below = _braking(max(command - lower, 0.0), most, dt)
         above = _braking(max(upper - command, 0.0), most, dt)
-        result[0, j], result[1, j] = low, high
+        # What slides must be able to stop before a limit, too.
+        result[0, j], result[1, j] = _clipped(-below, low, high), _clipped(above, low, high)
         result[2, j] = _clipped(_clipped(wanted, -below, above), low, high)
     return result
 
 
 @compiled
-def _allowed(bounds, poses, row):
-    """Whether a pose lies within all limits, coupled ones included."""
+def _coupled_range(bounds, which, governor):
+    """As ``coupled_range`` of the kinematics, bit for bit."""
+    first, last = bounds.coupled[which, 2], bounds.coupled[which, 3] - 1
+    if not governor > bounds.table[first, 0]:
+        return bounds.table[first, 1], bounds.table[first, 2]
+    if governor >= bounds.table[last, 0]:
+        return bounds.table[last, 1], bounds.table[last, 2]
+    i = first
+    while bounds.table[i + 1, 0] <= governor:
+        i += 1
+    step, width = governor - bounds.table[i, 0], bounds.table[i + 1, 0] - bounds.table[i, 0]
+    return (
+        (bounds.table[i + 1, 1] - bounds.table[i, 1]) / width * step + bounds.table[i, 1],
+        (bounds.table[i + 1, 2] - bounds.table[i, 2]) / width * step + bounds.table[i, 2],
+    )
+
+
+@compiled
+def settle(bounds, poses, row):
+    """Whether a pose lies within all limits, coupled ones included; what rounding adds to those is taken off."""
     for j in range(poses.shape[1]):
         if not (bounds.joints[0, j] <= poses[row, j] <= bounds.joints[1, j]):
             return False
     for which in range(len(bounds.coupled)):
-        joint, by, first = bounds.coupled[which, 0], bounds.coupled[which, 1], bounds.coupled[which, 2]
-        last, governor = bounds.coupled[which, 3] - 1, poses[row, by]
-        if not governor > bounds.table[first, 0]:
-            low, high = bounds.table[first, 1], bounds.table[first, 2]
-        elif governor >= bounds.table[last, 0]:
-            low, high = bounds.table[last, 1], bounds.table[last, 2]
-        else:
-            i = first
-            while bounds.table[i + 1, 0] <= governor:
-                i += 1
-            step, width = governor - bounds.table[i, 0], bounds.table[i + 1, 0] - bounds.table[i, 0]
-            low = (bounds.table[i + 1, 1] - bounds.table[i, 1]) / width * step + bounds.table[i, 1]
-            high = (bounds.table[i + 1, 2] - bounds.table[i, 2]) / width * step + bounds.table[i, 2]
+        joint = bounds.coupled[which, 0]
+        low, high = _coupled_range(bounds, which, poses[row, bounds.coupled[which, 1]])
         if not (low - _SLACK <= poses[row, joint] <= high + _SLACK):
             return False
+        poses[row, joint] = _clipped(poses[row, joint], low, high)
     return True
 
 
@@ -154,7 +163,7 @@ def ahead(bounds, command, velocity, dt):
             way = time * (speed - 0.5 * most * time)
             poses[row, j] = _clipped(end + way if velocity[j] > 0.0 else end - way, lower, upper)
     for row in range(1 + count):
-        if not _allowed(bounds, poses, row):
+        if not settle(bounds, poses, row):
             return poses, False
     return poses, True
 

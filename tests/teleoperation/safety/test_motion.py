@@ -86,6 +86,28 @@ def test_a_free_target_is_reached_where_a_straight_way_or_one_over_rest_is_free(
     assert reached > 18
 
 
+@pytest.mark.parametrize(
+    ("name", "number", "steps"),
+    [
+        ("nao", 106, 25),  # the target lies within the reserve
+        ("nao", 371, 25),  # a way to a standstill touched between two looks
+        ("nao", 251, 25),  # a slide ran into a joint limit
+        ("pepper", 510, 25),  # a coupled limit was missed by rounding
+        ("pepper", 644, 110),  # the way back from a corner was walked from corner to corner
+    ],
+)
+def test_pairs_of_poses_that_once_went_wrong(name: str, number: int, steps: int) -> None:
+    robot = catalog.get(name)
+    assert isinstance(robot, Robot)
+    rng, check = np.random.default_rng([0, number]), SelfCollision(robot)  # as in scripts/study_live_safety.py
+    start, goal = free_pose(robot, check, rng), free_pose(robot, check, rng)
+    arm = Arm(robot, start)
+    for _ in range(steps):
+        arm.go(goal)
+    arm.check()
+    assert np.abs(arm.motion.command - goal).max() < 1e-3
+
+
 def test_a_detour_is_found_where_the_straight_way_is_barred(pepper: Robot) -> None:
     rng, check, limiter, found = np.random.default_rng(0), SelfCollision(pepper), CommandLimiter(pepper), 0
     for _ in range(80):
