@@ -16,7 +16,7 @@ from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, SydaError, nearest_name
 from syda_gym.evaluation.pools import Tell
-from syda_gym.evaluation.prediction.bed import TestBed, recorded_angles
+from syda_gym.evaluation.prediction.bed import TestBed, positioned_angles, recorded_angles
 from syda_gym.evaluation.prediction.trial import BedFrames, fit_all, held_out_errors
 from syda_gym.files import fingerprint
 from syda_gym.motions.loading import load_motions
@@ -211,6 +211,14 @@ def _as_recorded(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
     return np.asarray(reached / np.maximum(np.linalg.norm(reached, axis=-1, keepdims=True), 1e-9))
 
 
+def _by_positions(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
+    """Led by wrist and elbow positions at full speed: of the bed's procedure its aim alone, none of its habits."""
+    both = [np.repeat(clip[:, None], len(robot.sides), axis=1) for clip in wanted]
+    found, part = positioned_angles(robot, both), robot.arm_slices[index]
+    reached = np.stack([np.diff(robot.chains[index].points(q[:, part])[:, :3], axis=1) for q in found])
+    return np.asarray(reached / np.maximum(np.linalg.norm(reached, axis=-1, keepdims=True), 1e-9))
+
+
 def _retargeted(settings: BedSettings, retargeter: Retargeter) -> Rehearsal:
     return _plain(settings, retargeter=retargeter)
 
@@ -226,6 +234,7 @@ DRY_RUNS: dict[str, Callable[[BedSettings], Rehearsal]] = {
     "sensors twice as noisy": lambda settings: _sensors(settings, 2.0),
     "without joint speeds": lambda settings: _retargeted(settings, _without_speeds),
     "tracked by Gauss-Newton steps": lambda settings: _retargeted(settings, track),
+    "led by positions without lag": lambda settings: _retargeted(settings, _by_positions),
     "recording procedure known": lambda settings: _retargeted(settings, _as_recorded),
 }
 """Variants of the dry run; the first is the default."""
