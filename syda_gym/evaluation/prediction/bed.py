@@ -22,7 +22,16 @@ from syda_gym.motions.clip import Motions, Take
 from syda_gym.motions.synthetic.performance import Performer
 from syda_gym.routes.dry_run.plan import FPS, Plan
 
-__all__ = ["HUMANS", "ROBOTS", "TestBed", "bed_bodies", "positioned_angles", "recorded_angles"]
+__all__ = [
+    "HUMANS",
+    "ROBOTS",
+    "SPEED_SHARE",
+    "TOP_SPEED",
+    "TestBed",
+    "bed_bodies",
+    "positioned_angles",
+    "recorded_angles",
+]
 
 HUMANS = ("adult", "kid", "stiff", "long_arms")
 """People of the bed: two sizes, one of limited mobility, one of other proportions."""
@@ -33,8 +42,12 @@ ROBOTS = (
 )  # fmt: skip
 """Robots of the bed: one of every family of ``example-robot-data`` with two arms, Pepper and NAO."""
 
-_SPEED_SHARE = 0.9  # of a joint's top speed
-_TOP_SPEED = 20.0  # rad/s; where a URDF gives none
+SPEED_SHARE = 0.9
+"""Of a joint's top speed, that robots use when they are recorded."""
+
+TOP_SPEED = 20.0
+"""[rad/s] at most, where a URDF gives none."""
+
 _UPPER_SHARE = 0.506  # of the operator's arm: positions are led in the operator's proportions
 _START_STEPS = 80
 _DAMPING = 1e-2
@@ -136,7 +149,7 @@ def recorded_angles(robot: Robot, meant: Sequence[FloatArray], seed: int) -> lis
     """
     rng = np.random.default_rng([seed, zlib.crc32(robot.name.encode()), 7])
     elbow, pull, gain = rng.uniform(0.2, 0.6), 10.0 ** rng.uniform(-2.5, -1.7), rng.uniform(0.55, 0.9)
-    return _positioned(robot, meant, np.sqrt([elbow, 1.0]), pull, _Pace(gain, _SPEED_SHARE))
+    return _positioned(robot, meant, np.sqrt([elbow, 1.0]), pull, _Pace(gain, SPEED_SHARE))
 
 
 def positioned_angles(robot: Robot, meant: Sequence[FloatArray]) -> list[FloatArray]:
@@ -178,7 +191,7 @@ def _led(robot: Robot, arm: int, goal: FloatArray, weights: FloatArray, pull: fl
     """Angles ``(K, T, n)`` of one arm whose elbow and wrist are led to ``goal`` ``(K, T, 2, 3)`` [arm lengths]."""
     chain, part = robot.chains[arm], robot.arm_slices[arm]
     length, rest = float(robot.arm_lengths[arm].sum()), robot.rest[part]
-    most = pace.speed * np.minimum(robot.speed[part], _TOP_SPEED) / FPS / pace.steps
+    most = pace.speed * np.minimum(robot.speed[part], TOP_SPEED) / FPS / pace.steps
     clips, count = goal.shape[:2]
 
     def step(q: FloatArray, wanted: FloatArray) -> FloatArray:

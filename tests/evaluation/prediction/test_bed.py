@@ -72,9 +72,9 @@ def test_led_by_positions_without_lag_is_the_aim_of_the_recordings_alone(bed: Te
 def test_everything_is_scored_and_finished_pieces_are_taken_again(bed: TestBed, tmp_path) -> None:
     settings = BedSettings(bed, folds=2, method="geometric", preset="fixed")
     pool = InlinePool(open_bed, settings)
-    kept = ["planned motion", "without joint speeds", "tracked by Gauss-Newton steps"]
+    kept = ["planned motion", "without joint speeds", "limbs pointed with lag", "led by positions without lag"]
     found = study_bed(settings, tmp_path, sessions=2, dry_runs=kept, pool=pool, resamples=20)
-    assert pool.computed == len(bed_jobs(2, kept)) == 7
+    assert pool.computed == len(bed_jobs(2, kept)) == 8
     assert (found["pairs"], found["chains"]) == (12, 24)
     for name in (*kept, "T general", "hops", "measured", "coverage"):
         scores = found["scores"][name]
