@@ -28,6 +28,7 @@ PARSED = {
     "syda-gym tune": "minutes; tests/agents/test_work.py",
     "syda-gym benchmark study.yaml": "minutes to hours; tests/evaluation/benchmark",
     "syda-gym benchmark examples/paper_benchmark.yaml": "needs the paper's recordings; tests/evaluation",
+    "syda-gym benchmark examples/route_choice.yaml": "minutes; tests/evaluation/benchmark/test_choice.py",
     "syda-gym compare study other": "needs two benchmarks; tests/evaluation/benchmark",
     "syda-gym suggest adult kid pepper --pair kid:pepper --benchmark": "needs a benchmark; tests/evaluation",
     "syda-gym export-episodes": "needs the extra data; tests/evaluation/data_sets",

@@ -24,11 +24,13 @@ def spread_out(rows: FloatArray, count: int) -> FloatArray:
     Returns:
         ``(M, D)``, M at most ``count``; fewer where the others are copies.
     """
-    from syda_gym.mappings.spreading_kernel import farthest  # numba is imported where mappings are fitted, not before
+    # numba is imported where mappings are fitted, not before.
+    from syda_gym.embodiments.limb_ik.compiling import first_call
+    from syda_gym.mappings.spreading_kernel import farthest
 
     if len(rows) > _MOST:
         rows = rows[:: -(-len(rows) // _MOST)]
     first = int(np.argmin(np.sum((rows - rows.mean(axis=0)) ** 2, axis=1)))
-    loop: Any = farthest  # compiled by numba, which has no types
-    chosen: FloatArray = rows[loop(np.ascontiguousarray(rows, dtype=np.float64), first, min(count, len(rows)), _SAME)]
+    own = np.ascontiguousarray(rows, dtype=np.float64)
+    chosen: FloatArray = rows[first_call(farthest, own, first, min(count, len(rows)), _SAME)]
     return chosen

@@ -123,28 +123,28 @@ def route_choices(results: Results, motions: Motions, *, seed: int = 0) -> Route
 
 def choice_table(found: RouteChoices) -> Table:
     """The comparison as a table."""
-    columns = [
+    columns = [  # what a narrow terminal leaves out stands last
         Column("Ends"),
         Column("Method"),
-        Column("Agent"),
-        Column("Disturbance"),
-        Column("Routes"),
         Column("Fixed route", tip="what route='auto' takes among those played"),
         Column("Its error", "cm", 2, 100, "mean landmark error, interval over actions"),
         Column("One for each clip", "cm", 2, 100, "what route='per_motion' takes"),
-        Column("Difference", "cm", 2, 100, "per clip minus fixed over the same clips"),
-        Column("Verdict"),
         Column("Changed", tip="clips with another route than the fixed one"),
+        Column("Verdict"),
+        Column("Difference", "cm", 2, 100, "per clip minus fixed over the same clips"),
         Column("of them better"),
+        Column("Best for each clip in hindsight", "cm", 2, 100, "what no choice can beat"),
         Column("Best fixed in hindsight"),
         Column("Its error", "cm", 2, 100),
-        Column("Best for each clip in hindsight", "cm", 2, 100, "what no choice can beat"),
+        Column("Agent"),
+        Column("Disturbance"),
+        Column("Routes"),
         Column("Clips"),
     ]
     rows: list[list[Cell]] = [
         [
-            one.ends, one.method, one.agent, one.disturbance, one.routes, one.fixed, one.error, one.per_motion,
-            one.difference, one.verdict, one.changed, one.gained, one.best, one.best_error, one.least, one.clips,
+            one.ends, one.method, one.fixed, one.error, one.per_motion, one.changed, one.verdict, one.difference,
+            one.gained, one.least, one.best, one.best_error, one.agent, one.disturbance, one.routes, one.clips,
         ]
         for one in found.choices
     ]  # fmt: skip

@@ -16,7 +16,7 @@ from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, SydaError, nearest_name
 from syda_gym.evaluation.pools import Tell
-from syda_gym.evaluation.prediction.bed import TestBed, recorded_angles
+from syda_gym.evaluation.prediction.bed import SPEED_SHARE, TOP_SPEED, TestBed, positioned_angles, recorded_angles
 from syda_gym.evaluation.prediction.trial import BedFrames, fit_all, held_out_errors
 from syda_gym.files import fingerprint
 from syda_gym.motions.loading import load_motions
@@ -30,6 +30,8 @@ from syda_gym.routes.metric import Transferability, transferability
 __all__ = ["DRY_RUNS", "BedJob", "BedSettings", "bed_routes", "open_bed"]
 
 Names = tuple[str, ...]
+
+_MIDDLING_GAIN = 0.72
 
 _FORMATS = {"session": "1", "dry_run": "2", "T": "1"}  # of what is computed; another one is computed anew
 
@@ -195,20 +197,47 @@ def _half(plan: Plan) -> Plan:
 
 def _without_speeds(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
     """As the default, by motors that know no limit."""
-    solver, part = LimbIK.of(robot), robot.arm_slices[index]
+    return _limbs(robot, index, _followed(robot, index, wanted, limited=False))
+
+
+def _lagging(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
+    """As the default, late as the bed's robots are: a middling gain, and a share of the joints' speeds."""
+    angles = _followed(robot, index, wanted, limited=True)
+    most = SPEED_SHARE * np.minimum(robot.speed[robot.arm_slices[index]], TOP_SPEED) / FPS
+    for frame in range(1, angles.shape[1]):
+        step = _MIDDLING_GAIN * (angles[:, frame] - angles[:, frame - 1])
+        angles[:, frame] = angles[:, frame - 1] + np.clip(step, -most, most)
+    return _limbs(robot, index, angles)
+
+
+def _followed(robot: Robot, index: int, wanted: FloatArray, *, limited: bool) -> FloatArray:
+    """Angles ``(K, T, n)`` of one arm that the library's solver leads."""
+    solver = LimbIK.of(robot)
     both = np.repeat(wanted[:, :, None], len(robot.sides), axis=2)
-    angles, _ = solver.follow(both, solver.begin(len(wanted)), 1.0 / FPS, limited=False)
-    limbs = np.diff(robot.chains[index].points(angles[:, :, part].reshape(-1, part.stop - part.start))[:, :3], axis=1)
-    return np.asarray(limbs / np.maximum(np.linalg.norm(limbs, axis=-1, keepdims=True), 1e-9)).reshape(wanted.shape)
+    angles, _ = solver.follow(both, solver.begin(len(wanted)), 1.0 / FPS, limited=limited)
+    return np.array(angles[:, :, robot.arm_slices[index]])
+
+
+def _limbs(robot: Robot, index: int, angles: FloatArray) -> FloatArray:
+    """Unit directions ``(K, T, 2, 3)`` of angles ``(K, T, n)`` of one arm."""
+    clips, frames = angles.shape[:2]
+    limbs = np.diff(robot.chains[index].points(angles.reshape(clips * frames, -1))[:, :3], axis=1)
+    unit = limbs / np.maximum(np.linalg.norm(limbs, axis=-1, keepdims=True), 1e-9)
+    return np.asarray(unit).reshape(clips, frames, 2, 3)
 
 
 def _as_recorded(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
     """The bed's own recording procedure, with the weights of no session that is recorded."""
     both = [np.repeat(clip[:, None], len(robot.sides), axis=1) for clip in wanted]
     found = recorded_angles(robot, both, 10_000)
-    part = robot.arm_slices[index]
-    reached = np.stack([np.diff(robot.chains[index].points(q[:, part])[:, :3], axis=1) for q in found])
-    return np.asarray(reached / np.maximum(np.linalg.norm(reached, axis=-1, keepdims=True), 1e-9))
+    return _limbs(robot, index, np.stack([q[:, robot.arm_slices[index]] for q in found]))
+
+
+def _by_positions(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
+    """Led by wrist and elbow positions at full speed: of the bed's procedure its aim alone, none of its habits."""
+    both = [np.repeat(clip[:, None], len(robot.sides), axis=1) for clip in wanted]
+    found = positioned_angles(robot, both)
+    return _limbs(robot, index, np.stack([q[:, robot.arm_slices[index]] for q in found]))
 
 
 def _retargeted(settings: BedSettings, retargeter: Retargeter) -> Rehearsal:
@@ -226,6 +255,8 @@ DRY_RUNS: dict[str, Callable[[BedSettings], Rehearsal]] = {
     "sensors twice as noisy": lambda settings: _sensors(settings, 2.0),
     "without joint speeds": lambda settings: _retargeted(settings, _without_speeds),
     "tracked by Gauss-Newton steps": lambda settings: _retargeted(settings, track),
+    "limbs pointed with lag": lambda settings: _retargeted(settings, _lagging),
+    "led by positions without lag": lambda settings: _retargeted(settings, _by_positions),
     "recording procedure known": lambda settings: _retargeted(settings, _as_recorded),
 }
 """Variants of the dry run; the first is the default."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -94,6 +95,12 @@ def test_ends_that_cannot_be_planned_are_named(small_motions) -> None:
     assert found.choices == ()
     assert "left_only>pepper" in found.skipped[0]
     assert "two arms" in found.skipped[0]
+
+
+def test_the_example_is_read() -> None:
+    config = BenchmarkConfig.read(Path(__file__).resolve().parents[3] / "examples" / "route_choice.yaml")
+    assert {(route[0], route[-1]) for route in config.routes} == {("tall", "pepper")}
+    assert len(config.routes) == 4
 
 
 def test_the_page_holds_the_table(computed, small_motions, tmp_path) -> None:
