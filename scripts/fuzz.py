@@ -7,8 +7,9 @@ journals and network packets gets files built to hurt (circles, aliases that mul
 archives that unpack to gigabytes; see ``fuzz_build``) and valid samples that were damaged as bytes (cut, overwritten,
 repeated, mixed) or inside their container (a JSON value replaced, a member of an archive changed, a header of weights
 falsified). A reader may take what it gets or raise a ``SydaError``; anything else is a finding, as is an input that
-takes longer or more memory than the limit. An input follows from its seed and number alone. After each seed the
-results are written, and a seed that they hold already is not run again; findings are kept beside them.
+takes longer or more memory than the limit. An input follows from its seed and number alone. Every 500 inputs the
+results are written, and what they hold already is not run again: the same command goes on. Findings are kept beside
+them.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from syda_gym.files import read_json, write_json
 ROOT = Path(__file__).resolve().parents[1]
 LIMIT = 5.0  # s of processor time for one input
 MEMORY = 1 << 30  # bytes beyond what is in use before the first input
+BLOCK = 500  # inputs between two writings
 BUILT = 0.2  # share of inputs that are built instead of damaged
 Tally = dict[str, dict[str, int]]
 
@@ -61,12 +63,16 @@ def main() -> int:
             found = each_builder(targets, options.each)
             write_json(options.out, found)
             return 1 if any(entry["findings"] for entry in found.values()) else 0
+        begun = result.setdefault("begun", {})  # seed to how many of its inputs are done
         for seed in range(options.first, options.first + options.seeds):
-            if seed in result["seeds"]:
-                continue
-            add(result, seed, *run(targets, options.inputs, seed, options.out.parent))
-            result["command"] = f"python scripts/fuzz.py --inputs {options.inputs} --seeds {len(result['seeds'])}"
-            write_json(options.out, result)
+            while begun.get(str(seed), 0) < options.inputs:
+                first = begun.get(str(seed), 0)
+                last = min(first + BLOCK, options.inputs)
+                add(result, *run(targets, range(first, last), seed, options.out.parent))
+                begun[str(seed)] = last
+                result["seeds"] = sorted(int(one) for one, done in begun.items() if done >= options.inputs)
+                result["command"] = f"python scripts/fuzz.py --inputs {options.inputs} --seeds {options.seeds}"
+                write_json(options.out, result)
     print(f"{result['inputs']} inputs, {len(result['findings'])} findings: {options.out}")
     return 1 if result["findings"] else 0
 
@@ -97,8 +103,8 @@ def limit_memory() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
 
-def run(targets: list[Target], inputs: int, seed: int, folder: Path) -> tuple[Tally, list[dict[str, Any]]]:
-    """Gives every target its share of the inputs.
+def run(targets: list[Target], numbers: range, seed: int, folder: Path) -> tuple[Tally, list[dict[str, Any]]]:
+    """Gives every target its share of the inputs, of which these numbers are read.
 
     Returns:
         Per target the inputs and how many were read all the same; and the findings, at most one per kind of exception
@@ -107,8 +113,12 @@ def run(targets: list[Target], inputs: int, seed: int, folder: Path) -> tuple[Ta
     tally = {target.name: {"inputs": 0, "read": 0} for target in targets}
     seen: set[tuple[str, str]] = set()
     findings: list[dict[str, Any]] = []
-    for number in range(inputs):
-        target = min(targets, key=lambda one: tally[one.name]["inputs"] / one.share)
+    given = dict.fromkeys(tally, 0)
+    for number in range(numbers.stop):
+        target = min(targets, key=lambda one: given[one.name] / one.share)
+        given[target.name] += 1
+        if number < numbers.start:
+            continue
         rng = np.random.default_rng([seed, number])
         built = target.build and rng.random() < BUILT
         make = target.build[int(rng.integers(len(target.build)))] if built else target.damage
@@ -126,9 +136,8 @@ def run(targets: list[Target], inputs: int, seed: int, folder: Path) -> tuple[Ta
     return tally, findings
 
 
-def add(result: dict[str, Any], seed: int, tally: Tally, findings: list[dict[str, Any]]) -> None:
-    """Adds one seed's counts and findings to the results."""
-    result["seeds"].append(seed)
+def add(result: dict[str, Any], tally: Tally, findings: list[dict[str, Any]]) -> None:
+    """Adds a block's counts and findings to the results."""
     result["findings"] += findings
     for name, counts in tally.items():
         total = result["by_target"].setdefault(name, {"inputs": 0, "read": 0})

@@ -88,7 +88,7 @@ def added(before: dict[str, Any], now: dict[str, Any]) -> dict[str, Any]:
             result[name] = added(value, now.get(name, {}))
         elif name not in now:
             result[name] = value
-        elif isinstance(value, int):
+        elif isinstance(value, int) or name == "moved_rad":
             result[name] = value + now[name]
         else:
             result[name] = max(value, now[name])

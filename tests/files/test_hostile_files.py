@@ -29,6 +29,8 @@ MAY_BE_READ = {
     "card_sizes",
     "other_sizes",
     "card_numbers",
+    "workbook_strings",
+    "mapping-weights-marked zero_spreads",  # where zeros are points and not spreads; of an agent they are never read
 }
 
 
@@ -51,5 +53,5 @@ def test_built_files_are_refused_in_our_words(outcomes: dict[str, Any], pair: st
     entry = outcomes[pair]
     assert entry["inputs"] == 6
     assert entry["findings"] == []
-    if pair.split()[1] not in MAY_BE_READ:
+    if not {pair, pair.split()[1]} & MAY_BE_READ:
         assert entry["read"] == 0

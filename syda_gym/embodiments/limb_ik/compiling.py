@@ -34,11 +34,11 @@ def compiled(function: Function) -> Function:
     """
     try:
         made: Any = numba.njit(cache=True, error_model="numpy")(function)
-        if may_keep(made._cache.cache_path, inspect.getfile(function)):
-            return made  # type: ignore[no-any-return]
+        keep = may_keep(made._cache.cache_path, inspect.getfile(function))
     except RuntimeError:  # no folder can be written
-        pass
-    return numba.njit(error_model="numpy")(function)  # type: ignore[no-any-return]
+        keep = False
+    result: Function = made if keep else numba.njit(error_model="numpy")(function)
+    return result
 
 
 def first_call(function: Callable[..., Any], *arguments: Any) -> Any:

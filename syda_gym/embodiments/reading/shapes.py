@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Mapping
 from functools import lru_cache
@@ -20,6 +21,7 @@ FloatArray = NDArray[np.float64]
 
 _SIZES = {"box": (("size", 3),), "sphere": (("radius", 1),), "cylinder": (("radius", 1), ("length", 1)),
           "capsule": (("radius", 1), ("length", 1))}  # fmt: skip
+_PLAIN_MESHES = (".stl", ".obj", ".dae", ".ply", ".off", ".glb")
 _MOST_MESH_BYTES = 24 * 2**20  # a larger mesh would take seconds to read
 _RING = 8
 _DIRECTIONS = 128  # in which the farthest corners of a mesh are kept
@@ -138,9 +140,12 @@ def _read_mesh(path: Path) -> FloatArray:
             rows = np.frombuffer(content, dtype=np.uint8, offset=84).reshape(count, 50)[:, 12:48]
             found = np.ascontiguousarray(rows).view("<f4").reshape(-1, 3).astype(np.float64)
             return found
+    if path.suffix.lower() not in _PLAIN_MESHES:  # archives unpack to anything
+        raise ValueError(f"{path.suffix} is no mesh")
     import trimesh
 
-    loaded = trimesh.load(path, force="mesh", process=False)
+    # From memory: a mesh that names further files, materials or pictures, gets none of them.
+    loaded = trimesh.load(io.BytesIO(content), file_type=path.suffix[1:].lower(), force="mesh", process=False)
     return np.asarray(loaded.vertices, dtype=np.float64)
 
 

@@ -105,13 +105,11 @@ class Pace:
             most: deceleration.
             alike: all joints in proportion, so that a straight line stays one.
         """
-        speed = self._faster * np.abs(self._was)
-        need = most * self._braking
-        share = (
-            np.maximum(1.0 - need / np.maximum(speed, _TINY), 0.0) * self._faster * self._lasts / max(self.dt, _TINY)
-        )
+        speed = np.maximum(self._faster * np.abs(self._was), _TINY)
+        kept = np.maximum(1.0 - most * self._braking / speed, 0.0)
         if alike:
-            share = share[np.argmin(need / np.maximum(speed, _TINY))]
+            kept = np.full(len(kept), kept.min(where=self._was != 0.0, initial=1.0))
+        share = kept * self._faster * self._lasts / max(self.dt, _TINY)
         result: FloatArray = self._was * np.minimum(share, 1.0)
         return result
 

@@ -221,7 +221,8 @@ class _Stage:
         while True:
             self.source.inbox.reopen()
             try:
-                return self.approach(self.robot.rest)
+                self.approach(self.robot.rest)
+                return
             except _Again:
                 pass
             except _Ended:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import pytest
 
 from syda_gym.embodiments.kinematics.urdf import read_urdf
-from syda_gym.embodiments.reading import apart
+from syda_gym.embodiments.reading import apart, shapes
 from syda_gym.errors import EmbodimentError
 
 XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
@@ -95,3 +96,16 @@ def test_pipes_and_devices_are_no_robots_and_no_meshes(tmp_path: Path) -> None:
     path = tmp_path / "meshes.urdf"
     path.write_text(f'<robot name="r">{links}{joints}</robot>')
     assert read_urdf(path) is not None
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no such devices")
+def test_what_a_mesh_names_is_not_opened(tmp_path: Path) -> None:
+    pytest.importorskip("trimesh")
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+    mesh = tmp_path / "a.obj"
+    mesh.write_text(f"mtllib /dev/zero\n{corners}usemtl m\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n")
+    assert len(shapes._mesh_corners(mesh)) == 4
+    archive = tmp_path / "a.zip"
+    with zipfile.ZipFile(archive, "w") as file:
+        file.write(mesh, "a.obj")
+    assert len(shapes._mesh_corners(archive)) == 0

@@ -251,3 +251,21 @@ def test_any_landmark_array(tmp_path: Path, shape: tuple[int, int, int], scale: 
         with contextlib.suppress(MotionError):
             take = read_mediapipe(tmp_path / "any.npz").takes[0]
             assert np.isfinite(take.frames["operator"]).all()
+
+
+@pytest.mark.parametrize("kept", range(1, 20))
+def test_a_header_that_names_more_columns_than_the_lines_have(tmp_path: Path, kept: int) -> None:
+    joints = ["left_shoulder", "left_elbow", "left_wrist", "right_shoulder", "right_elbow", "right_wrist"]
+    places = [(0.2, 0.5, 2.0), (0.5, 0.5, 2.0), (0.7, 0.5, 2.0), (-0.2, 0.5, 2.0), (-0.5, 0.5, 2.0), (-0.7, 0.5, 2.0)]
+    row = [f"{value}" for place in places for value in place]
+    path = tmp_path / "cut.csv"
+    head = ",".join(["timestamp", *(f"{joint}_{axis}" for joint in joints for axis in "xyz")])
+    lines = [",".join([f"{t / 30}", *row][:kept]) for t in range(30)]
+    path.write_text("\n".join([head, *lines]))
+    try:
+        motions = load_motions(f"table:{path}")
+    except MotionError:
+        assert kept < 19
+    else:
+        assert kept >= 10, "an arm is there"
+        assert len(motions.takes) == 1

@@ -102,7 +102,8 @@ def table_recording(path: Path, said: Said, format: str | None = None) -> Record
         return from_numbers(grid, said, format)
     if is_stacked(grid):
         return from_stacked(grid, said, format if format not in ("kinect", "openni") else None)
-    best = max((find_columns(row) for row in grid.header), key=lambda one: (len(one.points), len(one.axes)))
+    width = grid.values.shape[1]  # what a header names beyond is in no line
+    best = max((find_columns(row[:width]) for row in grid.header), key=lambda one: (len(one.points), len(one.axes)))
     if is_long(best):
         return from_long(grid, best, said, format)
     if best.points or any("," in place for place in said.joints.values()):
