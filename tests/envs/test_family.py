@@ -12,6 +12,7 @@ import pytest
 import yaml
 from gymnasium.utils.env_checker import check_env
 
+import syda_gym
 from syda_gym.envs.family import FAMILY, MAX_STEPS
 from syda_gym.envs.task.options import SUCCESS_ERRORS
 from syda_gym.files import asset
@@ -66,14 +67,16 @@ def test_hyper_parameters_are_shipped_for_every_id():
 
 
 def test_success_tells_agents_apart():
-    """On every fourth clip: whoever corrects nothing succeeds about half of the time, the lead more often."""
+    """On the first takes of training actions the base succeeds about half of the time, the lead more often."""
     shares = {}
-    env = gym.make("SydaTeleop-v0", physics="servo", action_mode="position").unwrapped
+    families = syda_gym.load_motions("embedded").families
+    seen = sorted(action for action, family in families.items() if family not in ("cross", "clap", "signal"))
+    env = gym.make("SydaTeleop-v0", physics="servo", action_mode="position", actions=seen[::2]).unwrapped
     gain = 1.0 - (1.0 - env.motor_gain) ** env.substeps
     rng = np.random.default_rng(0)
     for name in ("base", "lead", "random", "zero"):
         succeeded = []
-        for clip in range(0, len(env.clip_names), 4):
+        for clip in [env.clip_actions.index(action) for action in seen[::2]]:
             _, info = env.reset(seed=clip, options={"motion": clip})
             done = False
             while not done:
@@ -89,7 +92,7 @@ def test_success_tells_agents_apart():
                 done = terminated or truncated
             succeeded.append(info["is_success"])
         shares[name] = np.mean(succeeded)
-    assert 0.35 < shares["base"] < 0.65
+    assert 0.3 < shares["base"] < 0.7
     assert shares["lead"] > shares["base"]
     assert shares["random"] < 0.5 * shares["base"]
     assert shares["zero"] == 0.0
