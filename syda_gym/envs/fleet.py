@@ -52,7 +52,7 @@ class EpisodeWish:
 class Ending(NamedTuple):
     """An episode that ended: robot, clip, first frame, number of frames, mean landmark error [m]."""
 
-    index: int
+    robot: int
     clip: int
     start: int
     frames: int

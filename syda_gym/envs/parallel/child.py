@@ -146,7 +146,7 @@ class _Work:
         return Answer(tuple(dict(rng.bit_generator.state) for rng in rngs), tuple(ended))
 
 
-def _generator(state: dict[str, Any]) -> np.random.Generator:
+def _generator(state: Any) -> np.random.Generator:
     bits = np.random.PCG64()
     bits.state = state
     return np.random.Generator(bits)
