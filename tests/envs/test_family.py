@@ -66,17 +66,23 @@ def test_hyper_parameters_are_shipped_for_every_id():
         assert all(float(entry["n_timesteps"]) > 0 and entry["gamma"] == 0.5 for entry in content.values())
 
 
-def test_success_tells_agents_apart():
-    """On the first takes of training actions the base succeeds about half of the time, the lead more often."""
+@pytest.mark.parametrize("reference", ["mapped", "paired"])
+def test_success_tells_agents_apart(reference):
+    """On the first takes of training actions the base succeeds about half of the time, random actions hardly ever.
+
+    The lead takes the motors' lag away, all that keeps the base from the mapped reference; beside the mapping's
+    own error against the recorded motion it hardly shows.
+    """
     shares = {}
     families = syda_gym.load_motions("embedded").families
     seen = sorted(action for action, family in families.items() if family not in ("cross", "clap", "signal"))
-    env = gym.make("SydaTeleop-v0", physics="servo", action_mode="position", actions=seen[::2]).unwrapped
+    env = gym.make("SydaTeleop-v0", physics="servo", action_mode="position", actions=seen[::3], reference=reference)
+    env = env.unwrapped
     gain = 1.0 - (1.0 - env.motor_gain) ** env.substeps
     rng = np.random.default_rng(0)
     for name in ("base", "lead", "random", "zero"):
         succeeded = []
-        for clip in [env.clip_actions.index(action) for action in seen[::2]]:
+        for clip in [env.clip_actions.index(action) for action in seen[::3]]:
             _, info = env.reset(seed=clip, options={"motion": clip})
             done = False
             while not done:
@@ -92,7 +98,7 @@ def test_success_tells_agents_apart():
                 done = terminated or truncated
             succeeded.append(info["is_success"])
         shares[name] = np.mean(succeeded)
-    assert 0.3 < shares["base"] < 0.7
-    assert shares["lead"] > shares["base"]
+    assert 0.3 < shares["base"] < 0.75
+    assert shares["lead"] >= (0.95 if reference == "mapped" else shares["base"])
     assert shares["random"] < 0.5 * shares["base"]
     assert shares["zero"] == 0.0
