@@ -310,7 +310,7 @@ def page(result: dict[str, Any]) -> str:
         f"{', '.join(UNSEEN)}; ten", "actions). J is landmark error [mm] + 0.05 x joint error [mrad] + jitter "
         "[mm/frame³]; less is better. Return is the sum of", "the environment's rewards, success the share of episodes "
         "within the id's `success_error`. Means with 95 % intervals over", "actions; disturbances and networks are "
-        "drawn anew for each seed. Formulas without disturbances have no chance in them.", "",
+        "drawn anew for each seed; where nothing is disturbed, a formula is the same for every seed.", "",
         "PPO and SAC learn from scratch with the id's own observation, action and reward, and the hyper-parameters "
         "that come with", "the package (`syda_gym/assets/rl_zoo3`): a minute's budget, no history, no preview. "
         "Shipped agents were trained on generated", "motions of other families; which of them is shipped was decided "
