@@ -310,7 +310,7 @@ def page(result: dict[str, Any]) -> str:
         f"{', '.join(UNSEEN)}; ten", "actions). J is landmark error [mm] + 0.05 x joint error [mrad] + jitter "
         "[mm/frame³]; less is better. Return is the sum of", "the environment's rewards, success the share of episodes "
         "within the id's `success_error`. Means with 95 % intervals over", "actions; disturbances and networks are "
-        "drawn anew for each seed. Formulas without disturbances have no chance in them.", "",
+        "drawn anew for each seed; where nothing is disturbed, a formula is the same for every seed.", "",
         "PPO and SAC learn from scratch with the id's own observation, action and reward, and the hyper-parameters "
         "that come with", "the package (`syda_gym/assets/rl_zoo3`): a minute's budget, no history, no preview. "
         "Shipped agents were trained on generated", "motions of other families; which of them is shipped was decided "
@@ -344,8 +344,10 @@ def page(result: dict[str, Any]) -> str:
         lines.append("")
     lines += [
         "## Learning", "",
-        "Mean return of the training episodes, in the servo model (Bullet for contacts); grey lines are base and best "
-        "formula on", "the same actions.", "", "![Returns of PPO and SAC while they learn](images/leaderboard.png)", "",
+        "Mean return of the training episodes, exploration included, in the servo model (Bullet for contacts); the "
+        "first points are", "of the shortest clips, which end first. Grey lines are base and best formula on the first takes "
+        "of the same actions,", "in Bullet.", "",
+        "![Returns of PPO and SAC while they learn](images/leaderboard.png)", "",
     ]  # fmt: skip
     return "\n".join(lines)
 

@@ -190,7 +190,7 @@ class SydaTeleopEnv(Face, gymnasium.Env[Observation, Action]):
     | ``whole_body`` | ``False`` | simulate head, hip, knee and wheels as joints, too, for three times the cost |
     | ``reward`` | ``None`` | weights that differ from the table above |
     | ``terminate_error`` | ``None`` | mean landmark error that ends an episode [m] |
-    | ``success_error`` | ``None`` | mean landmark error of a successful episode [m]; 0.041 paired, 0.008 mapped |
+    | ``success_error`` | ``None`` | mean landmark error of a successful episode [m]; 0.036 paired, 0.008 mapped |
     | ``start`` | ``"first"`` | first frame: ``first``, ``uniform``, or ``failures`` (where the error is large) |
     | ``disturbances`` | ``None`` | ``"teleop:CELL:LEVEL"``, another preset, a dict, or ``Disturbances`` |
     | ``camera`` | ``None`` | ``CameraView`` or a dict: size, place, ghost, operator, error colours, meshes |

@@ -196,10 +196,9 @@ class InlinePool(Pool):
 
 
 @dataclass
-class _Member:
-    """One process of a pool."""
+class _Member(Worker):
+    """One process of a pool, and the pipe to it."""
 
-    worker: Worker
     opened: bool = False
     busy: bool = field(default=False)
 
@@ -213,14 +212,14 @@ class ProcessPool(Pool):
         self._members: list[_Member] = []
         try:
             for _ in range(size):
-                self._members.append(_Member(start_worker(_serve)))
+                self._members.append(_started())
         except BaseException:
             self.close()
             raise
 
     def submit(self, worker: int, job: Any) -> None:
         """Gives a job to a worker; one that died meanwhile is replaced."""
-        if not self._members[worker].worker.process.is_alive():
+        if not self._members[worker].process.is_alive():
             self._replace(worker)
         try:
             self._send(worker, job)
@@ -234,8 +233,8 @@ class ProcessPool(Pool):
 
         while True:
             busy = {worker: member for worker, member in enumerate(self._members) if member.busy}
-            by_handle = {member.worker.pipe: worker for worker, member in busy.items()}
-            by_handle |= {member.worker.process.sentinel: worker for worker, member in busy.items()}
+            by_handle = {member.pipe: worker for worker, member in busy.items()}
+            by_handle |= {member.process.sentinel: worker for worker, member in busy.items()}
             for worker in {by_handle[handle] for handle in wait(list(by_handle))}:
                 done = self._heard(worker, told)
                 if done is not None:
@@ -245,35 +244,40 @@ class ProcessPool(Pool):
     def close(self) -> None:
         """Ends the processes; those that do not listen are killed."""
         members, self._members = self._members, []
-        end_workers([member.worker for member in members])
+        end_workers(members)
 
     def _send(self, worker: int, job: Any) -> None:
         member = self._members[worker]
         if not member.opened:
-            member.worker.pipe.send((self._opener, self._arguments))
+            member.pipe.send((self._opener, self._arguments))
             member.opened = True
-        member.worker.pipe.send(job)
+        member.pipe.send(job)
         member.busy = True
 
     def _replace(self, worker: int) -> None:
-        lost = self._members[worker].worker
+        lost = self._members[worker]
         lost.lost()
         lost.pipe.close()
-        self._members[worker] = _Member(start_worker(_serve))
+        self._members[worker] = _started()
 
     def _heard(self, worker: int, told: Callable[[int, float], None]) -> Done | None:
         """One message of a worker; what it said last counts, even if it is gone."""
-        lost = self._members[worker].worker
+        member = self._members[worker]
         try:
-            if lost.pipe.poll():
-                kind, content = lost.pipe.recv()
+            if member.pipe.poll():
+                kind, content = member.pipe.recv()
                 if kind == "told":
                     told(worker, content)
                     return None
                 return Done(worker, content) if kind == "result" else Done(worker, failure=content)
         except (EOFError, OSError):
             pass  # it died with half a word
-        return Done(worker, failure=lost.lost())
+        return Done(worker, failure=member.lost())
+
+
+def _started() -> _Member:
+    worker = start_worker(_serve)
+    return _Member(worker.process, worker.pipe)
 
 
 def _serve(pipe: Any) -> None:

@@ -12,6 +12,7 @@ import pytest
 import yaml
 from gymnasium.utils.env_checker import check_env
 
+import syda_gym
 from syda_gym.envs.family import FAMILY, MAX_STEPS
 from syda_gym.envs.task.options import SUCCESS_ERRORS
 from syda_gym.files import asset
@@ -54,7 +55,8 @@ def test_the_measured_numbers_are_those_of_the_rule():
     for member in FAMILY:
         found = results[member.id]
         default = SUCCESS_ERRORS["mapped" if member.options.get("reference") == "mapped" else "paired"]
-        assert member.reward_threshold == found["reward_threshold"] == round(max(found["returns"].values()), 1)
+        assert member.reward_threshold == found["reward_threshold"]
+        assert member.reward_threshold == pytest.approx(max(found["returns"].values()), abs=0.06)
         assert member.options.get("success_error", default) == found["success_error"]
 
 
@@ -65,15 +67,23 @@ def test_hyper_parameters_are_shipped_for_every_id():
         assert all(float(entry["n_timesteps"]) > 0 and entry["gamma"] == 0.5 for entry in content.values())
 
 
-def test_success_tells_agents_apart():
-    """On every fourth clip: whoever corrects nothing succeeds about half of the time, the lead more often."""
+@pytest.mark.parametrize("reference", ["mapped", "paired"])
+def test_success_tells_agents_apart(reference):
+    """On the first takes of training actions the base succeeds about half of the time, random actions hardly ever.
+
+    The lead takes the motors' lag away, all that keeps the base from the mapped reference; beside the mapping's
+    own error against the recorded motion it hardly shows.
+    """
     shares = {}
-    env = gym.make("SydaTeleop-v0", physics="servo", action_mode="position").unwrapped
+    families = syda_gym.load_motions("embedded").families
+    seen = sorted(action for action, family in families.items() if family not in ("cross", "clap", "signal"))
+    env = gym.make("SydaTeleop-v0", physics="servo", action_mode="position", actions=seen[::3], reference=reference)
+    env = env.unwrapped
     gain = 1.0 - (1.0 - env.motor_gain) ** env.substeps
     rng = np.random.default_rng(0)
     for name in ("base", "lead", "random", "zero"):
         succeeded = []
-        for clip in range(0, len(env.clip_names), 4):
+        for clip in [env.clip_actions.index(action) for action in seen[::3]]:
             _, info = env.reset(seed=clip, options={"motion": clip})
             done = False
             while not done:
@@ -89,7 +99,7 @@ def test_success_tells_agents_apart():
                 done = terminated or truncated
             succeeded.append(info["is_success"])
         shares[name] = np.mean(succeeded)
-    assert 0.35 < shares["base"] < 0.65
-    assert shares["lead"] > shares["base"]
+    assert 0.3 < shares["base"] < 0.75
+    assert shares["lead"] >= (0.95 if reference == "mapped" else shares["base"])
     assert shares["random"] < 0.5 * shares["base"]
     assert shares["zero"] == 0.0

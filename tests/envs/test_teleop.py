@@ -243,7 +243,7 @@ def test_an_episode_ends_with_its_clip_and_says_whether_it_succeeded(cheap):
             assert not terminated
         length = env._fleet.repertoire.clips[env.clip_names.index(info["motion"])].length
         assert len(errors) == length
-        assert info["is_success"] == (np.mean(errors) <= 0.041)
+        assert info["is_success"] == (np.mean(errors) <= 0.036)
     strict = make(cheap, terminate_error=0.005)
     strict.reset(seed=0)
     results = [strict.step(np.ones(10)) for _ in range(3)]
