@@ -245,7 +245,7 @@ def curve_picture(cells: Mapping[tuple[str, str], Cell], path: Path) -> None:
     for axis, cell in zip(axes.ravel(), cells.values(), strict=True):
         for name in cell.conditions():
             x, y = iqm(cell.values(name, "jitter")), iqm(cell.values(name, "landmark_mm"))
-            learned = "predictor" in name or "residual" in name
+            learned = any(kind in name for kind in ("predictor", "residual", "stack"))
             colour = plt.cm.tab10(every.index(name) % 10)
             axis.scatter(
                 x, y, s=90 if learned else 50, marker="*" if learned else "o", color=colour, zorder=3, label=name
