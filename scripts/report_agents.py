@@ -4,9 +4,10 @@
     python scripts/report_agents.py --study study --validation    # only J on the validation motions, before the test
 
 Tables hold interquartile means over all episodes and seeds of a condition, with bootstrap intervals that redraw
-episodes and seeds within their action. Bars are ratios of means, with the least and the largest ratio of a seed beside
-them. The opponent of a bar is the rival with the least J on the test motions themselves, a choice that favours the
-rivals. Nothing here looks at anything but the stored figures.
+episodes and seeds within their action. Bars are ratios of means, with the interval over motions in brackets and, where
+there are several seeds, the least and the largest ratio of a seed in parentheses. A policy on a predictor is compared
+with the predictor of the same seed. The opponent of a bar is the rival with the least J on the test motions themselves,
+a choice that favours the rivals. Nothing here looks at anything but the stored figures.
 """
 
 from __future__ import annotations
@@ -54,8 +55,11 @@ class Cell:
         self.name, self.level = name, level
         rows: Rows = read_json(study / name / f"test-{level}.json")
         grouped: dict[str, list[Sequence[Mapping[str, Any]]]] = defaultdict(list)
+        self.labels: dict[str, list[str]] = defaultdict(list)
         for label, found in rows.items():
-            grouped[label.rsplit("-", 1)[0] if label[-1].isdigit() else label].append(found)
+            name, seed = label.rsplit("-", 1) if label[-1].isdigit() else (label, "")
+            grouped[name].append(found)
+            self.labels[name].append(seed)
         self.runs = grouped
         self.seeds = {condition: len(found) for condition, found in grouped.items()}
         first = next(iter(rows.values()))
@@ -111,20 +115,34 @@ def summary(cell: Cell) -> dict[str, dict[str, float]]:
 
 
 class Ratio:
-    """A condition's mean over a baseline's, on all episodes or on some of them, over all seeds and seed by seed."""
+    """A condition's mean over a baseline's, on all episodes or on some of them, over all seeds and seed by seed.
+
+    ``low`` and ``high`` are of the interval that redraws motions, with the seeds as they are.
+    """
 
     def __init__(
         self, cell: Cell, condition: str, baseline: str, figure: str, which: NDArray[np.bool_] | None = None
     ) -> None:
         chosen = np.ones(len(cell.actions), dtype=bool) if which is None else which
-        below = cell.values(baseline, figure)[:, chosen].mean()
+        below = cell.values(baseline, figure)[:, chosen].mean(axis=1)
+        known = dict(zip(cell.labels[baseline], below, strict=True))
+        seeds = cell.labels[condition]
+        # What was trained upon the baseline's own seeds is compared with these, seed by seed.
+        below = np.array([known[seed] for seed in seeds]) if set(seeds) <= set(known) else below.mean()
         self.seeds = cell.values(condition, figure)[:, chosen].mean(axis=1) / below
         self.mean = float(self.seeds.mean())
+        used = [seed for seed in cell.labels[baseline] if seed in seeds] or cell.labels[baseline]
+        rows = [cell.labels[baseline].index(seed) for seed in used]
+        mine = cell.values(condition, figure)[:, chosen].mean(axis=0)
+        theirs = cell.values(baseline, figure)[rows][:, chosen].mean(axis=0)
+        drawn = np.random.default_rng(0).integers(len(mine), size=(2000, len(mine)))
+        self.low, self.high = np.quantile(mine[drawn].sum(axis=1) / theirs[drawn].sum(axis=1), [0.025, 0.975])
 
     def __str__(self) -> str:
+        text = f"{self.mean:.3f} [{self.low:.3f} to {self.high:.3f}]"
         if len(self.seeds) == 1:
-            return f"{self.mean:.3f}"
-        return f"{self.mean:.3f} ({self.seeds.min():.3f} to {self.seeds.max():.3f})"
+            return text
+        return f"{text} ({self.seeds.min():.3f} to {self.seeds.max():.3f})"
 
 
 def bars(cells: Mapping[tuple[str, str], Cell]) -> list[str]:
@@ -228,7 +246,7 @@ def curve_picture(cells: Mapping[tuple[str, str], Cell], path: Path) -> None:
     for axis, cell in zip(axes.ravel(), cells.values(), strict=True):
         for name in cell.conditions():
             x, y = iqm(cell.values(name, "jitter")), iqm(cell.values(name, "landmark_mm"))
-            learned = "predictor" in name or "residual" in name
+            learned = any(kind in name for kind in ("predictor", "residual", "stack"))
             colour = plt.cm.tab10(every.index(name) % 10)
             axis.scatter(
                 x, y, s=90 if learned else 50, marker="*" if learned else "o", color=colour, zorder=3, label=name
@@ -275,10 +293,12 @@ def validation(study: Path, out: Path) -> None:
     for folder in sorted(path.parent for path in study.glob("*/rivals.json")):
         rivals = read_json(folder / "rivals.json")
         found = {name: dict(rivals[name]["validation"]) for name in ("base", "lead", "kalman")}
+        stacked = {path.stem[-1] for path in folder.glob("stack-[0-9].json")}
         for kind in conditions[3:]:
-            curves = [
-                read_json(path)["figures"]["validation_curve"] for path in sorted(folder.glob(f"{kind}-[0-9].json"))
-            ]
+            paths = sorted(folder.glob(f"{kind}-[0-9].json"))
+            if kind == "predictor":  # of the same seeds as the policies on them
+                paths = [path for path in paths if path.stem[-1] in stacked] or paths
+            curves = [read_json(path)["figures"]["validation_curve"] for path in paths]
             best = [min(curve, key=lambda point: float(point["J"])) for curve in curves]
             if best:
                 found[kind] = {name: float(np.mean([point[name] for point in best])) for name in ("J", "jitter")}

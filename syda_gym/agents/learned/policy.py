@@ -90,8 +90,8 @@ class ResidualPolicy(Agent):
         for index, (inputs, outputs) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
             weights[f"layers.{index}.weight"] = np.zeros((outputs, inputs), dtype=np.float32)
             weights[f"layers.{index}.bias"] = np.zeros(outputs, dtype=np.float32)
-        normal: dict[str, Any] = {"mean": np.zeros(sizes[0]), "std": np.ones(sizes[0])}
-        return cls(interface, base, weights=weights, each_arm=each_arm, **normal, **settings)
+        mean, std = np.zeros(sizes[0]), np.ones(sizes[0])
+        return cls(interface, base, weights=weights, mean=mean, std=std, each_arm=each_arm, **settings)
 
     def reset(self, count: int, seed: int | None = None) -> None:
         """Forgets the corrections."""
