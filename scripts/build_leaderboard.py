@@ -344,9 +344,9 @@ def page(result: dict[str, Any]) -> str:
         lines.append("")
     lines += [
         "## Learning", "",
-        "Mean return of the training episodes, exploration included, in the servo model (Bullet for contacts); the "
-        "first points are", "of the shortest clips, which end first. Grey lines are base and best formula on the first "
-        "takes of the same actions,", "in Bullet.", "",
+        "Mean return of the training episodes, exploration included, in the servo model (Bullet for contacts); the",
+        "first points are of the shortest clips, which end first. Grey lines are base and best formula on the first",
+        "takes of the same actions, in Bullet.", "",
         "![Returns of PPO and SAC while they learn](images/leaderboard.png)", "",
     ]  # fmt: skip
     return "\n".join(lines)

@@ -29,7 +29,8 @@ def test_a_limit_cuts_the_vector_environment_where_the_wrapper_cuts_the_single_o
         assert reward == rewards[0]
         assert bool(truncated) == bool(cut[0]) == (step == 11)
     assert np.array_equal(infos["final_obs"][0], observation)
-    for bad in (0, -1, 2.5, True):
+    assert vector(2, max_episode_steps=-1)._fleet._max_steps is None  # as Gymnasium's make has it
+    for bad in (0, -2, 2.5, True):
         with pytest.raises(OptionError, match="max_episode_steps"):
             vector(2, max_episode_steps=bad)
 
