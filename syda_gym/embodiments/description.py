@@ -224,6 +224,8 @@ def _arm(entry: Any) -> ArmDescription:
     joints = entry["joints"]
     if not isinstance(joints, list) or not all(isinstance(name, str) for name in joints):
         raise ValueError(f"'joints' must list the names of joints, got {joints!r}")
+    if not isinstance(entry["side"], str):
+        raise ValueError(f"'side' must be left or right, got {entry['side']!r}")
     links, offsets = {}, {}
     for point in POINTS:
         links[point], offset = _point(point, entry[point])

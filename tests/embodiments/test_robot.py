@@ -1,3 +1,6 @@
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 import yaml
@@ -170,3 +173,14 @@ def test_register_and_resolve(tmp_path, pepper, monkeypatch):
     _description(tmp_path / "robots", name="mine").rename(tmp_path / "robots" / "mine.yaml")
     assert "mine" in catalog.names()
     assert catalog.get("mine").name == "mine"
+
+
+@pytest.mark.parametrize("side", ["[]", "{a: 1}", "null", "3", "up"])
+def test_a_side_that_is_none_is_refused_in_our_words(tmp_path: Path, side: str) -> None:
+    text = asset("robots", "pepper.yaml").read_text()
+    path = tmp_path / "pepper.yaml"
+    path.write_text(re.sub(r"side: \w+", f"side: {side}", text, count=1))
+    assert path.read_text() != text
+    (tmp_path / "pepper.urdf").write_bytes(asset("robots", "pepper.urdf").read_bytes())
+    with pytest.raises(EmbodimentError, match=r"side|arms"):
+        Robot.read(path)
