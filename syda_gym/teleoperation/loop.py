@@ -353,6 +353,8 @@ class TeleoperationLoop:
         else:
             moved = self._motion.follow(self._target, factor)
             self._held_back = moved.held_back
+            if self._motion.slowed:
+                reasons.append("timing: slowed")
             if moved.detour:
                 reasons.append("self-collision: detour")
             elif moved.held_back:

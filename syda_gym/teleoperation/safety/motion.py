@@ -28,6 +28,7 @@ _SAME_GOAL = 0.2  # rad; a target that moves less is the same one, with noise
 _PROGRESS = 0.02  # rad
 _PATIENCE = 0.3  # s without progress after which a held back robot looks for another way
 _AGAIN = 1.0  # s until it looks once more
+_NOTICEABLE = 0.9  # share of the speed limits
 _ARRIVED = 0.03  # rad; nearer than that, no detour is worth it
 _CORNER = 0.15  # rad between two remembered poses
 _CORNERS = 60
@@ -99,6 +100,12 @@ class Motion:
     def standing(self) -> bool:
         """Whether the robot stands still by its commands."""
         return float(np.abs(self._pace.velocity).max()) < _STANDING
+
+    @property
+    def slowed(self) -> bool:
+        """Whether joints may not reach their speed limits because commands leave late."""
+        harmless = self._most / GENTLE * self._pace.punctuality.seconds
+        return bool((harmless < _NOTICEABLE * self._limiter.speed).any())
 
     def place(self, pose: FloatArray) -> None:
         """The robot is at ``pose`` ``(n,)`` [rad] and does not move."""

@@ -14,7 +14,7 @@ SPACING = 0.7
 
 _RECENT = 16  # steps
 _RESERVE = 1.5  # how much later than ever lately a command may leave
-_MEMORY = 20.0  # s for which a late command makes the robot slower
+_MEMORY = 5.0  # s for which a late command makes the robot slower
 _CAUTION = 5.0  # s at the beginning in which nobody knows yet how late commands will be
 
 

@@ -13,8 +13,8 @@ from syda_gym.embodiments.limb_ik.compiling import compiled
 
 __all__ = ["Bounds", "ahead", "apart", "drifted", "intention", "settle"]
 
+_SLACK = 1e-12  # rad; rounding of a coupled limit, which is taken off
 _LOOK = 0.02  # rad; how far apart the looked-at poses of a way to a standstill are
-_SLACK = 1e-12  # rad; by which coupled limits may be missed through rounding
 
 
 class Bounds(NamedTuple):
@@ -125,7 +125,7 @@ def _coupled_range(bounds, which, governor):
 
 @compiled
 def settle(bounds, poses, row):
-    """Whether a pose lies within all limits, coupled ones included; what rounding adds to those is taken off."""
+    """Whether a pose lies within all limits, coupled ones included, once what rounding adds to those is taken off."""
     for j in range(poses.shape[1]):
         if not (bounds.joints[0, j] <= poses[row, j] <= bounds.joints[1, j]):
             return False
