@@ -231,7 +231,8 @@ def _arm(entry: Any) -> ArmDescription:
         links[point], offset = _point(point, entry[point])
         if offset is not None:
             offsets[point] = offset
-    return ArmDescription(entry["side"], tuple(joints), **links, offsets=offsets)
+    side: Any = entry["side"]  # which of the two it is, the class looks
+    return ArmDescription(side, tuple(joints), **links, offsets=offsets)
 
 
 def _point(name: str, value: Any) -> tuple[str, Point | None]:

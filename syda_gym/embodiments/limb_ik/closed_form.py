@@ -1,4 +1,7 @@
-"""closed_form: the poses that point both limbs of an arm without regard to its limits, in compiled plain loops."""
+"""closed_form: the poses that point both limbs of an arm without regard to its limits, in compiled plain loops.
+
+``unit`` makes the limbs' directions.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import numpy as np
 
 from syda_gym.embodiments.limb_ik.compiling import compiled, copy
 
-__all__ = ["closed_form"]
+__all__ = ["closed_form", "unit"]
 
 _TURN = 2.0 * math.pi
 
@@ -79,3 +82,15 @@ def closed_form(arm, target, starts):
                 j = arm.closed[index]
                 angle = elbows[e, index] if index < 2 else wrists[w, index - 2]
                 row[j] = _wrapped(angle, arm.lower[j], arm.upper[j])
+
+
+@compiled
+def unit(vectors, shortest, result):
+    """Vectors (N, 3) of length one; whether all were finite and no shorter than that."""
+    sound = True
+    for row in range(len(vectors)):
+        x, y, z = vectors[row, 0], vectors[row, 1], vectors[row, 2]
+        length = math.sqrt(x * x + y * y + z * z)
+        sound = sound and length >= shortest and length < math.inf
+        result[row, 0], result[row, 1], result[row, 2] = x / length, y / length, z / length
+    return sound

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from syda_gym.embodiments.limb_ik.closed_form import closed_form
+from syda_gym.embodiments.limb_ik.closed_form import closed_form, unit
 from syda_gym.embodiments.limb_ik.compiling import compiled, copy
 
 __all__ = ["follow", "look", "solve", "unit"]
@@ -472,18 +472,6 @@ def follow_arm(arm, target, dt, limited, fresh, state):
     for j in range(n):
         state[j], state[n + j] = q[j], goal[j]
     state[2 * n], state[2 * n + 1], state[2 * n + 2] = patience, 1.0 if going else 0.0, bend
-
-
-@compiled
-def unit(vectors, shortest, result):
-    """Vectors (N, 3) of length one; whether all were finite and no shorter than that."""
-    sound = True
-    for row in range(len(vectors)):
-        x, y, z = vectors[row, 0], vectors[row, 1], vectors[row, 2]
-        length = math.sqrt(x * x + y * y + z * z)
-        sound = sound and length >= shortest and length < math.inf
-        result[row, 0], result[row, 1], result[row, 2] = x / length, y / length, z / length
-    return sound
 
 
 @compiled

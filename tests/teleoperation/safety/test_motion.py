@@ -93,7 +93,7 @@ def test_a_free_target_is_reached_where_a_straight_way_or_one_over_rest_is_free(
         ("nao", 371, 25),  # a way to a standstill touched between two looks
         ("nao", 251, 25),  # a slide ran into a joint limit
         ("pepper", 510, 25),  # a coupled limit was missed by rounding
-        ("pepper", 644, 110),  # the way back from a corner was walked from corner to corner
+        ("pepper", 644, 135),  # the way back from a corner was walked from corner to corner
     ],
 )
 def test_pairs_of_poses_that_once_went_wrong(name: str, number: int, steps: int) -> None:
