@@ -18,6 +18,7 @@ from syda_gym.motions.synthetic.generator import BODIES
 from syda_gym.routes.dry_run import memory
 from syda_gym.routes.dry_run.imitation import imitate
 from syda_gym.routes.dry_run.memory import default_plan, imitation_key
+from syda_gym.routes.dry_run.rehearsal import RETARGETERS
 from syda_gym.routes.general import Sampling
 from syda_gym.routes.metric import compare_arms, pair_arms
 from syda_gym.routes.shipped import FILE, Rows, comparison_key
@@ -44,8 +45,9 @@ def imitations() -> dict[str, np.ndarray]:
     plan, found = default_plan(), {}
     for body in map(catalog.get, BODIES):
         if body.kind == "robot":
-            for clip, shown in zip(plan.clips, imitate(body, plan), strict=True):
-                found |= {f"{imitation_key(body, clip)}/{side}": arm for side, arm in shown.items()}
+            for way in RETARGETERS["either"]:
+                for clip, shown in zip(plan.clips, imitate(body, plan, way), strict=True):
+                    found |= {f"{imitation_key(body, clip, way)}/{side}": arm for side, arm in shown.items()}
     return found
 
 

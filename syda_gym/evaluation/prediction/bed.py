@@ -21,17 +21,9 @@ from syda_gym.errors import EmbodimentError, OptionError, nearest_name
 from syda_gym.motions.clip import Motions, Take
 from syda_gym.motions.synthetic.performance import Performer
 from syda_gym.routes.dry_run.plan import FPS, Plan
+from syda_gym.routes.dry_run.positions import Pace, led_by_positions
 
-__all__ = [
-    "HUMANS",
-    "ROBOTS",
-    "SPEED_SHARE",
-    "TOP_SPEED",
-    "TestBed",
-    "bed_bodies",
-    "positioned_angles",
-    "recorded_angles",
-]
+__all__ = ["HUMANS", "ROBOTS", "SPEED_SHARE", "TestBed", "bed_bodies", "recorded_angles"]
 
 HUMANS = ("adult", "kid", "stiff", "long_arms")
 """People of the bed: two sizes, one of limited mobility, one of other proportions."""
@@ -44,13 +36,6 @@ ROBOTS = (
 
 SPEED_SHARE = 0.9
 """Of a joint's top speed, that robots use when they are recorded."""
-
-TOP_SPEED = 20.0
-"""[rad/s] at most, where a URDF gives none."""
-
-_UPPER_SHARE = 0.506  # of the operator's arm: positions are led in the operator's proportions
-_START_STEPS = 80
-_DAMPING = 1e-2
 
 
 def bed_bodies(humans: Sequence[str] = HUMANS, robots: Sequence[str] = ROBOTS) -> dict[str, Embodiment]:
@@ -149,66 +134,10 @@ def recorded_angles(robot: Robot, meant: Sequence[FloatArray], seed: int) -> lis
     """
     rng = np.random.default_rng([seed, zlib.crc32(robot.name.encode()), 7])
     elbow, pull, gain = rng.uniform(0.2, 0.6), 10.0 ** rng.uniform(-2.5, -1.7), rng.uniform(0.55, 0.9)
-    return _positioned(robot, meant, np.sqrt([elbow, 1.0]), pull, _Pace(gain, SPEED_SHARE))
-
-
-def positioned_angles(robot: Robot, meant: Sequence[FloatArray]) -> list[FloatArray]:
-    """The same aim without the habits: middling weights, full speed, and steps enough to arrive in every frame.
-
-    Args:
-        robot: who.
-        meant: as for ``recorded_angles``.
-
-    Returns:
-        As ``recorded_angles``.
-    """
-    return _positioned(robot, meant, np.sqrt([0.4, 1.0]), 10.0**-2.1, _Pace(1.0, 1.0, 3))
-
-
-@dataclass(frozen=True)
-class _Pace:
-    """How a robot hurries: share of a step that is taken, share of the joints' speed, steps a frame."""
-
-    gain: float
-    speed: float
-    steps: int = 1
-
-
-def _positioned(
-    robot: Robot, meant: Sequence[FloatArray], weights: FloatArray, pull: float, pace: _Pace
-) -> list[FloatArray]:
     longest = max(len(clip) for clip in meant)
     together = np.stack([np.concatenate([c, np.repeat(c[-1:], longest - len(c), axis=0)]) for c in meant])
     angles = np.zeros((len(meant), longest, len(robot.joint_names)))
     for arm, part in enumerate(robot.arm_slices):
-        upper = _UPPER_SHARE * together[:, :, arm, 0]
-        goal = np.stack([upper, upper + (1.0 - _UPPER_SHARE) * together[:, :, arm, 1]], axis=2)
-        angles[:, :, part] = _led(robot, arm, goal, weights, pull, pace)
+        pace = Pace(gain, SPEED_SHARE, 1)
+        angles[:, :, part] = led_by_positions(robot, arm, together[:, :, arm], np.sqrt([elbow, 1.0]), pull, pace)
     return [robot.clamp(angles[k, : len(clip)]) for k, clip in enumerate(meant)]
-
-
-def _led(robot: Robot, arm: int, goal: FloatArray, weights: FloatArray, pull: float, pace: _Pace) -> FloatArray:
-    """Angles ``(K, T, n)`` of one arm whose elbow and wrist are led to ``goal`` ``(K, T, 2, 3)`` [arm lengths]."""
-    chain, part = robot.chains[arm], robot.arm_slices[arm]
-    length, rest = float(robot.arm_lengths[arm].sum()), robot.rest[part]
-    most = pace.speed * np.minimum(robot.speed[part], TOP_SPEED) / FPS / pace.steps
-    clips, count = goal.shape[:2]
-
-    def step(q: FloatArray, wanted: FloatArray) -> FloatArray:
-        points, jacobians = chain.jacobians(q)
-        gap = (wanted - (points[:, 1:3] - points[:, :1]) / length) * weights[:, None]
-        slope = (jacobians[:, 1:3] - jacobians[:, :1]) / length * weights[:, None, None]
-        flat, gap = slope.reshape(clips, 6, -1), gap.reshape(clips, 6)
-        normal = np.einsum("kij,kil->kjl", flat, flat) + (pull + _DAMPING) * np.eye(chain.n_joints)
-        right = np.einsum("kij,ki->kj", flat, gap) - pull * (q - rest)
-        return np.asarray(np.linalg.solve(normal, right[..., None])[..., 0])
-
-    q = np.repeat(rest[None], clips, axis=0)
-    for _ in range(_START_STEPS):
-        q = np.clip(q + np.clip(step(q, goal[:, 0]), -0.3, 0.3), chain.lower, chain.upper)
-    found = np.empty((clips, count, chain.n_joints))
-    for frame in range(count):
-        for _ in range(pace.steps if frame else 0):
-            q = np.clip(q + np.clip(pace.gain * step(q, goal[:, frame]), -most, most), chain.lower, chain.upper)
-        found[:, frame] = q
-    return found

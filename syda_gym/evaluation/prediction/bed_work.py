@@ -16,13 +16,14 @@ from syda_gym.embodiments.limb_ik.solver import LimbIK
 from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError, SydaError, nearest_name
 from syda_gym.evaluation.pools import Tell
-from syda_gym.evaluation.prediction.bed import SPEED_SHARE, TOP_SPEED, TestBed, positioned_angles, recorded_angles
+from syda_gym.evaluation.prediction.bed import SPEED_SHARE, TestBed, recorded_angles
 from syda_gym.evaluation.prediction.trial import BedFrames, fit_all, held_out_errors
 from syda_gym.files import fingerprint
 from syda_gym.motions.loading import load_motions
 from syda_gym.routes.dry_run.imitation import Retargeter, track
 from syda_gym.routes.dry_run.memory import default_plan
 from syda_gym.routes.dry_run.plan import FPS, Plan
+from syda_gym.routes.dry_run.positions import TOP_SPEED
 from syda_gym.routes.dry_run.rehearsal import DEPTH_CAMERA, Rehearsal
 from syda_gym.routes.measured import fit_options
 from syda_gym.routes.metric import Transferability, transferability
@@ -33,7 +34,7 @@ Names = tuple[str, ...]
 
 _MIDDLING_GAIN = 0.72
 
-_FORMATS = {"session": "1", "dry_run": "2", "T": "1"}  # of what is computed; another one is computed anew
+_FORMATS = {"session": "1", "dry_run": "3", "T": "1"}  # of what is computed; another one is computed anew
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,14 +234,7 @@ def _as_recorded(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
     return _limbs(robot, index, np.stack([q[:, robot.arm_slices[index]] for q in found]))
 
 
-def _by_positions(robot: Robot, index: int, wanted: FloatArray) -> FloatArray:
-    """Led by wrist and elbow positions at full speed: of the bed's procedure its aim alone, none of its habits."""
-    both = [np.repeat(clip[:, None], len(robot.sides), axis=1) for clip in wanted]
-    found = positioned_angles(robot, both)
-    return _limbs(robot, index, np.stack([q[:, robot.arm_slices[index]] for q in found]))
-
-
-def _retargeted(settings: BedSettings, retargeter: Retargeter) -> Rehearsal:
+def _retargeted(settings: BedSettings, retargeter: str | Retargeter) -> Rehearsal:
     return _plain(settings, retargeter=retargeter)
 
 
@@ -256,7 +250,8 @@ DRY_RUNS: dict[str, Callable[[BedSettings], Rehearsal]] = {
     "without joint speeds": lambda settings: _retargeted(settings, _without_speeds),
     "tracked by Gauss-Newton steps": lambda settings: _retargeted(settings, track),
     "limbs pointed with lag": lambda settings: _retargeted(settings, _lagging),
-    "led by positions without lag": lambda settings: _retargeted(settings, _by_positions),
+    "limbs pointed": lambda settings: _retargeted(settings, "limbs"),
+    "led by positions": lambda settings: _retargeted(settings, "positions"),
     "recording procedure known": lambda settings: _retargeted(settings, _as_recorded),
 }
 """Variants of the dry run; the first is the default."""

@@ -12,6 +12,7 @@ from syda_gym.embodiments.embodiment import Embodiment, FloatArray
 from syda_gym.files import asset, fingerprint
 from syda_gym.routes.dry_run.imitation import Retargeter, imitate
 from syda_gym.routes.dry_run.plan import Plan, plan_from_motions
+from syda_gym.routes.dry_run.positions import by_positions
 
 __all__ = ["FILE", "default_plan", "imitation_key", "imitation_of"]
 
@@ -38,14 +39,14 @@ def imitation_of(body: Embodiment, plan: Plan, retargeter: Retargeter | None = N
 
     A retargeter of the user is asked every time, because nothing tells whether it is the one of before.
     """
-    if retargeter is not None or body.kind != "robot":
+    if body.kind != "robot" or retargeter not in (None, by_positions):
         return imitate(body, plan, retargeter)
-    keys = [imitation_key(body, clip) for clip in plan.clips]
+    keys = [imitation_key(body, clip, retargeter) for clip in plan.clips]
     shipped = _shipped()
     missing = [place for place, key in enumerate(keys) if key not in _known and key not in shipped]
     if missing:
         part = Plan(tuple(plan.clips[k] for k in missing), tuple(plan.actions[k] for k in missing))
-        for place, clip in zip(missing, imitate(body, part), strict=True):
+        for place, clip in zip(missing, imitate(body, part, retargeter), strict=True):
             _known[keys[place]] = clip
     found = [_known[key] if key in _known else shipped[key] for key in keys]
     while len(_known) > _MOST * max(1, len(keys)):
@@ -53,15 +54,15 @@ def imitation_of(body: Embodiment, plan: Plan, retargeter: Retargeter | None = N
     return found
 
 
-def imitation_key(body: Embodiment, clip: FloatArray) -> str:
-    """Identifies everything that the imitation of one clip depends on."""
+def imitation_key(body: Embodiment, clip: FloatArray, retargeter: Retargeter | None = None) -> str:
+    """Identifies everything that the imitation of one clip by the library's own ways depends on."""
     spec = json.dumps(body.spec(), sort_keys=True, default=str)
     chains = getattr(body, "chains", ())
     numbers = [
         array.tobytes() for chain in chains for array in (chain.axes, chain.lower, chain.upper, chain.point_offsets)
     ]
     speed = np.asarray(getattr(body, "speed", ())).tobytes()
-    return fingerprint("imitation 2", spec, *numbers, speed, clip.tobytes())
+    return fingerprint("imitation 2" if retargeter is None else "positions 1", spec, *numbers, speed, clip.tobytes())
 
 
 @lru_cache(maxsize=1)

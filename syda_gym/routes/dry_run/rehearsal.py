@@ -1,9 +1,10 @@
 """Rehearsal: how well a route will carry motions, asked on paper before anything is recorded or fitted.
 
-Every body imitates the operator's planned motion within its joint limits and joint speeds; what would be recorded of
-it gets the noise of its sensor and a little imprecision. Each link is fitted by ridge regression between arm codes
-without the actions of a fold, links are *composed* along the route, and the route is scored on the held-out actions
-against what its last body would have shown itself:
+Every body imitates the operator's planned motion within its joint limits and joint speeds, robots in both of the ways
+in which they are commonly led (limbs pointed, hands led to positions), because nobody knows yet how they will be
+recorded; what would be recorded gets the noise of its sensor and a little imprecision. Each link is fitted by ridge
+regression between arm codes without the actions of a fold, links are *composed* along the route, and the route is
+scored on the held-out actions against what its last body would have shown itself:
 
     e_t = | p_B(t) - f_XB( ... f_AX( c_A(t) )) | / l_B,    mean over elbows and wrists
 
@@ -34,8 +35,9 @@ from syda_gym.errors import EmbodimentError, MotionError, OptionError, RouteErro
 from syda_gym.routes.dry_run.imitation import SIDES, Retargeter
 from syda_gym.routes.dry_run.memory import imitation_of
 from syda_gym.routes.dry_run.plan import Plan
+from syda_gym.routes.dry_run.positions import by_positions
 
-__all__ = ["DEPTH_CAMERA", "IMPRECISION", "TOLERANCE", "Rehearsal", "Score"]
+__all__ = ["DEPTH_CAMERA", "IMPRECISION", "RETARGETERS", "TOLERANCE", "Rehearsal", "Score"]
 
 DEPTH_CAMERA = 0.015
 """Noise of a landmark that a depth camera sees [m]; a robot's encoders are exact beside it."""
@@ -46,6 +48,14 @@ IMPRECISION = {"human": 0.045, "robot": 0.015}
 
 TOLERANCE = 0.1
 """Tau: an error that counts as none [arm lengths]."""
+
+RETARGETERS: dict[str, tuple[Retargeter | None, ...]] = {
+    "either": (None, by_positions),
+    "limbs": (None,),
+    "positions": (by_positions,),
+}
+"""How robots may be led when they are recorded: limbs pointed by the library's solver (``None``), elbows and wrists led
+to a person's positions, or, the default, nobody knows: both are rehearsed and count alike."""
 
 _FOLDS = 4
 _RIDGE = 0.05
@@ -97,12 +107,13 @@ class Rehearsal:
         plan: what the operator means to do.
         sensor: name to the noise of a landmark [m]; by default ``DEPTH_CAMERA`` for humans and 0 for robots.
         imprecision: name to imprecision per axis [arm lengths]; by default ``IMPRECISION``.
-        retargeter: how robots imitate; ``imitation.follow``, the library's own solver, by default.
+        retargeter: how robots will be led when they are recorded: a name of ``RETARGETERS``, or a function of one's own
+            (``imitation.Retargeter``). With several ways their scored frames are pooled.
         seed: of folds and noise.
 
     Raises:
         MotionError: a plan with fewer than two actions, which leaves nothing to hold out.
-        OptionError: noise for a body that is not here, or that is negative or not finite.
+        OptionError: noise for a body that is not here, or that is negative or not finite; an unknown retargeter.
     """
 
     def __init__(
@@ -112,7 +123,7 @@ class Rehearsal:
         *,
         sensor: Mapping[str, float] | None = None,
         imprecision: Mapping[str, float] | None = None,
-        retargeter: Retargeter | None = None,
+        retargeter: str | Retargeter = "either",
         seed: int = 0,
     ) -> None:
         names = np.unique(plan.actions)
@@ -124,32 +135,38 @@ class Rehearsal:
         self.bodies = dict(bodies)
         self.plan = plan
         self.seed = seed
-        self._retargeter = retargeter
+        self._ways = _ways(retargeter)
         self._sensor = _checked(sensor, self.bodies, "sensor")
         self._imprecision = _checked(imprecision, self.bodies, "imprecision")
         order = np.random.default_rng(seed).permutation(names)
         fold = {name: place % min(_FOLDS, len(names)) for place, name in enumerate(order)}
         self._keep = [np.arange(0, len(clip), _EVERY) for clip in plan.clips]
-        self.actions = np.repeat(np.array(plan.actions), [len(rows) for rows in self._keep])
-        folds = np.array([fold[action] for action in self.actions])
+        actions = np.repeat(np.array(plan.actions), [len(rows) for rows in self._keep])
+        self.actions = np.tile(actions, len(self._ways))
+        folds = np.array([fold[action] for action in actions])
         self._rows: list[NDArray[np.intp]] = [np.flatnonzero(folds == k) for k in range(folds.max() + 1)]
         self._rest: list[NDArray[np.intp]] = [np.flatnonzero(folds != k) for k in range(folds.max() + 1)]
-        self._shown: dict[str, _Shown] = {}
-        self._links: dict[tuple[bool, str, str], list[tuple[FloatArray, FloatArray]]] = {}
-        self._arrived: OrderedDict[tuple[bool, tuple[str, ...]], FloatArray] = OrderedDict()
+        self._shown: dict[tuple[str, int], _Shown] = {}
+        self._links: dict[tuple[bool, str, str, int], list[tuple[FloatArray, FloatArray]]] = {}
+        self._arrived: OrderedDict[tuple[bool, tuple[str, ...], int], FloatArray] = OrderedDict()
 
     def error(self, route: Sequence[str], *, noise: bool = True) -> FloatArray:
         """Error of every scored frame ``(N,)`` [arm lengths of the last body], its action held out of every link.
+
+        Where robots are led in several ways, the frames of the one come before those of the next; see ``actions``.
 
         Raises:
             RouteError: an unknown body, fewer than two, or two in a row without a common arm.
             EmbodimentError: a body that cannot imitate the plan at all.
         """
         names = self._check(route)
+        return np.concatenate([self._error(names, noise, way) for way in range(len(self._ways))])
+
+    def _error(self, names: tuple[str, ...], noise: bool, way: int) -> FloatArray:
         last = self.bodies[names[-1]]
-        shown = self.shown(names[-1])
+        shown = self._show(names[-1], way)
         wanted = shown.noisy if noise else shown.clean
-        gap = _landmarks(last, self._carry(names, noise)) - _landmarks(last, wanted)
+        gap = _landmarks(last, self._carry(names, noise, way)) - _landmarks(last, wanted)
         mean: FloatArray = np.linalg.norm(gap, axis=-1).mean(axis=(1, 2))
         return mean
 
@@ -176,15 +193,16 @@ class Rehearsal:
         per_action = self._per_action(gap)
         return float(gap.mean()), float(per_action.std(ddof=1) / np.sqrt(len(per_action)))
 
-    def shown(self, name: str) -> _Shown:
-        """What would be seen of a body, made when it is first needed.
+    def _show(self, name: str, way: int) -> _Shown:
+        """What would be seen of a body that is led in one of the ways, made when it is first needed.
 
         Raises:
             EmbodimentError: it cannot imitate the plan at all.
         """
-        if name not in self._shown:
-            body = self.bodies[name]
-            clips = imitation_of(body, self.plan, self._retargeter)
+        body = self.bodies[name]
+        way = way if body.kind == "robot" else 0  # people are not led
+        if (name, way) not in self._shown:
+            clips = imitation_of(body, self.plan, self._ways[way])
             sides = tuple(body.sides)
             clean = np.concatenate(
                 [
@@ -200,8 +218,8 @@ class Rehearsal:
                 )
             # Seeded by the name, so that a body shows the same whoever else rehearses.
             rng = np.random.default_rng([self.seed, zlib.crc32(name.encode())])
-            self._shown[name] = _Shown(sides, clean, _blurred(body, clean, self._sigma(name), rng))
-        return self._shown[name]
+            self._shown[name, way] = _Shown(sides, clean, _blurred(body, clean, self._sigma(name), rng))
+        return self._shown[name, way]
 
     def _sigma(self, name: str) -> float:
         body = self.bodies[name]
@@ -222,21 +240,21 @@ class Rehearsal:
                 )
         return names
 
-    def _carry(self, names: tuple[str, ...], noise: bool) -> FloatArray:
+    def _carry(self, names: tuple[str, ...], noise: bool, way: int) -> FloatArray:
         """Limb directions ``(N, sides, 2, 3)`` that arrive at the last body; what is common to routes is done once."""
         if len(names) == 1:
-            shown = self.shown(names[0])
+            shown = self._show(names[0], way)
             return shown.noisy if noise else shown.clean
-        key = (noise, names)
+        key = (noise, names, way)
         if key in self._arrived:
             self._arrived.move_to_end(key)
             return self._arrived[key]
         source, target = names[-2:]
-        before, sides = self._carry(names[:-1], noise), self.bodies[target].sides
+        before, sides = self._carry(names[:-1], noise, way), self.bodies[target].sides
         codes = _codes(self.bodies[source], before, self.bodies[source].sides)
         arrived = np.empty((len(before), len(sides), 2, 3))
         common = [side for side in sides if side in self.bodies[source].sides]
-        for (model, constant), rows in zip(self._link(noise, source, target), self._rows, strict=True):
+        for (model, constant), rows in zip(self._link(noise, source, target, way), self._rows, strict=True):
             for place, side in enumerate(sides):
                 if side in common:
                     code = codes[rows, self.bodies[source].sides.index(side)] @ model[1:] + model[0]
@@ -248,13 +266,13 @@ class Rehearsal:
             self._arrived.popitem(last=False)
         return arrived
 
-    def _link(self, noise: bool, a: str, b: str) -> list[tuple[FloatArray, FloatArray]]:
+    def _link(self, noise: bool, a: str, b: str, way: int) -> list[tuple[FloatArray, FloatArray]]:
         """Per fold the ridge from codes of ``a`` to codes of ``b``, and the mean code of each arm of ``b``."""
-        key = (noise, a, b)
+        key = (noise, a, b, way)
         if key not in self._links:
             ends = []
             for name in (a, b):
-                shown = self.shown(name)
+                shown = self._show(name, way)
                 ends.append(_codes(self.bodies[name], shown.noisy if noise else shown.clean, shown.sides))
             sides = self.bodies[a].sides, self.bodies[b].sides
             common = [side for side in sides[0] if side in sides[1]]
@@ -270,6 +288,14 @@ class Rehearsal:
 
     def _per_action(self, values: FloatArray) -> FloatArray:
         return np.array([values[self.actions == name].mean() for name in np.unique(self.actions)])
+
+
+def _ways(retargeter: str | Retargeter) -> tuple[Retargeter | None, ...]:
+    if callable(retargeter):
+        return (retargeter,)
+    if retargeter not in RETARGETERS:
+        raise OptionError(f"no retargeter {retargeter!r}; {nearest_name(str(retargeter), RETARGETERS)}")
+    return RETARGETERS[retargeter]
 
 
 def _checked(given: Mapping[str, float] | None, bodies: Mapping[str, Embodiment], what: str) -> dict[str, float]:

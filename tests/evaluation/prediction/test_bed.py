@@ -7,10 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from syda_gym.embodiments.robot import Robot
 from syda_gym.errors import OptionError
 from syda_gym.evaluation.pools import InlinePool
-from syda_gym.evaluation.prediction.bed import TestBed, bed_bodies, positioned_angles, recorded_angles
+from syda_gym.evaluation.prediction.bed import TestBed, bed_bodies
 from syda_gym.evaluation.prediction.bed_scores import score
 from syda_gym.evaluation.prediction.bed_study import bed_jobs, study_bed
 from syda_gym.evaluation.prediction.bed_work import BedJob, BedSettings, _faster, open_bed
@@ -52,27 +51,10 @@ def test_the_recorder_is_not_the_predictor_s_solver(bed: TestBed) -> None:
     assert 0.05 < apart < 0.8  # the same motion, another procedure
 
 
-def test_led_by_positions_without_lag_is_the_aim_of_the_recordings_alone(bed: TestBed) -> None:
-    nao = bed.bodies["nao"]
-    assert isinstance(nao, Robot)
-    meant = [clip.copy() for clip in bed.plan.clips[:3]]
-    goal = [0.506 * clip[:, 0, 0] + 0.494 * clip[:, 0, 1] for clip in meant]
-
-    def missed(angles: list[np.ndarray]) -> float:
-        points = [nao.arm_points(q)[:, 0] for q in angles]
-        wrists = [(p[:, 2] - p[:, 0]) / nao.arm_lengths[0].sum() for p in points]
-        return float(np.mean([np.linalg.norm(w - g, axis=-1).mean() for w, g in zip(wrists, goal, strict=True)]))
-
-    led, recorded = positioned_angles(nao, meant), recorded_angles(nao, meant, 0)
-    assert missed(led) < missed(recorded)
-    for q in led:
-        assert (np.abs(np.diff(q, axis=0)) * FPS <= np.minimum(nao.speed, 20.0) + 1e-6).all()
-
-
 def test_everything_is_scored_and_finished_pieces_are_taken_again(bed: TestBed, tmp_path) -> None:
     settings = BedSettings(bed, folds=2, method="geometric", preset="fixed")
     pool = InlinePool(open_bed, settings)
-    kept = ["planned motion", "without joint speeds", "limbs pointed with lag", "led by positions without lag"]
+    kept = ["planned motion", "without joint speeds", "limbs pointed with lag", "led by positions"]
     found = study_bed(settings, tmp_path, sessions=2, dry_runs=kept, pool=pool, resamples=20)
     assert pool.computed == len(bed_jobs(2, kept)) == 8
     assert (found["pairs"], found["chains"]) == (12, 24)
