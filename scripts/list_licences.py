@@ -36,11 +36,14 @@ repository says what we guard against ourselves.
 STATED_ELSEWHERE = {
     "cmeel-qhull": "Qhull",
     "embreex": "BSD-2-Clause",
+    "ezc3d": "MIT",
     "vhacdx": "MIT",
+    "xacro": "BSD",
 }
 SHORT = {
     "Apache Software License": "Apache-2.0",
     "Apache 2.0": "Apache-2.0",
+    "Apache License, Version 2.0": "Apache-2.0",
     "BSD License": "BSD",
     "MIT License": "MIT",
     "The MIT License (MIT)": "MIT",

@@ -51,9 +51,9 @@ def transferability(
 ) -> None:
     """Estimate how well each body can follow each other one, before anything is recorded.
 
-    The dry run plans the synthetic motions that come along, and those of `--motions` beside them, and takes robots to
-    be led as this library leads them. The picture shows workspaces of the first pair; with `--validate` estimates
-    beside measured errors.
+    The dry run plans the synthetic motions that come along, and those of `--motions` beside them, and leads robots in
+    both common ways: limbs pointed, hands led to positions. The picture shows workspaces of the first pair; with
+    `--validate` estimates beside measured errors.
     """
     from itertools import permutations
 

@@ -70,6 +70,7 @@ REFUSED = [
     ("teleop --method geometric --sink video:a.avi --journal run.jsonl", "a.avi"),
     ("teleop --method geometric --action wave_hgh --sink none --journal run.jsonl", "did you mean 'wave_high'"),
     ("teleop --journal run.txt", "--journal"),
+    ("journal export nowhere.jsonl", "nowhere.jsonl"),
     ("teleop --axes kinekt", "did you mean 'kinect'"),
     ("teleop --limit 2", "--limit"),
     ("teleop --rate 0", "--rate"),

@@ -41,7 +41,7 @@ def test_figures_follow_from_the_recording(env, mapping):
     assert figures.mapping_error == pytest.approx(
         landmark_error(env.robot, recording.base, recording.reference).mean(), abs=1e-9
     )
-    assert figures.success == (figures.landmark_error <= 0.1)
+    assert figures.success == (figures.landmark_error <= 0.036)  # the family's
     assert figures.frames == len(recording) == len(recording.reward)
     assert figures.limit_violations == env.robot.violations(mapping[0].raw(recording.operator), 1e-6).mean()
 
