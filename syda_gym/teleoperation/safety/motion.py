@@ -103,9 +103,12 @@ class Motion:
 
     @property
     def slowed(self) -> bool:
-        """Whether joints may not reach their speed limits because commands leave late."""
+        """Whether a joint goes as fast as it may because commands leave late, and could go faster otherwise."""
+        if self._pace.idle:
+            return False
         harmless = self._most / GENTLE * self._pace.punctuality.seconds
-        return bool((harmless < _NOTICEABLE * self._limiter.speed).any())
+        held = (harmless < _NOTICEABLE * self._limiter.speed) & (np.abs(self._step) > 0.99 * harmless * self._pace.dt)
+        return bool(held.any())
 
     def place(self, pose: FloatArray) -> None:
         """The robot is at ``pose`` ``(n,)`` [rad] and does not move."""

@@ -88,9 +88,7 @@ def test_one_by_one_and_by_layout_in_every_command(lab: Path, layout: Path, tmp_
         pairs = load_motions(tmp_path / f"pairs{way}")
         for action in ("wave_high", "drum"):
             right(pairs, action)
-        shown = run(
-            f"teleop --method geometric --source replay:{lab}/drum.csv {said} --sink none --calibration 0"
-        )
+        shown = run(f"teleop --method geometric --source replay:{lab}/drum.csv {said} --sink none --calibration 0")
         assert "commands for 90 frames" in shown
 
 
