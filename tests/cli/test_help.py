@@ -118,7 +118,7 @@ for words in {[list(words) for words in ALL]!r}:
     assert CliRunner().invoke(app, [*words, "--help"]).exit_code == 0, words
 heavy = {{"torch", "pybullet", "stable_baselines3", "matplotlib", "pinocchio", "scipy", "ray", "pandas", "yourdfpy"}}
 ours = [m for m in sys.modules if m.startswith("syda_gym.") and m.split(".")[1] not in ("cli", "errors")]
-ours = [m for m in ours if m not in ("syda_gym.envs", "syda_gym.envs.family")]  # names and numbers, which are registered
+ours = [m for m in ours if m not in ("syda_gym.envs", "syda_gym.envs.family")]  # names and numbers
 print(json.dumps([sorted(heavy & set(sys.modules)), ours]))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
