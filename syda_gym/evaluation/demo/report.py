@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from syda_gym.envs.task.options import SUCCESS_ERRORS
 from syda_gym.evaluation.chains import name_of
 from syda_gym.evaluation.demo.known import without_unknown
 from syda_gym.evaluation.demo.playback import _SHOWN_HZ, _liveliest, _stride, _tracks, playback_chain
@@ -203,7 +204,11 @@ def _headlines(result: DemoResult, best: ChainResult) -> list[Headline]:
             f"{100 * best.figure('mapping_error').value:.1f} cm without motors",
             "good" if error.value < 0.1 else "warn",
         ),
-        Headline("Success", f"{100 * _mean(best, 'success'):.0f} %", "episodes below 10 cm of mean landmark error"),
+        Headline(
+            "Success",
+            f"{100 * _mean(best, 'success'):.0f} %",
+            f"episodes below {100 * SUCCESS_ERRORS['paired']:.1f} cm of mean landmark error, the base's median",
+        ),
     ]
     coverage = _mean(best, "coverage")
     if np.isfinite(coverage):

@@ -81,11 +81,11 @@ class ResidualResult:
     def headline(self) -> Headline:
         """The residual against the best of the others in one number."""
         other, policy = self.best_other(), self.agent("residual")
-        before, after = float(np.mean(other.costs)), float(np.mean(policy.costs))
+        before, after = (agent.estimate(agent.costs).value for agent in (other, policy))  # as in the table
         change = self.change()
         return Headline(
             f"Residual: J against {other.name}, the best of the others",
-            f"{100 * (after / before - 1):+.0f} %",
+            f"{100 * (after / before - 1):+.1f} %",
             f"J {before:.2f} to {after:.2f} on unseen actions; change {_words(change)}",
             "good" if change.high < 0 else "plain" if change.low <= 0 else "warn",
         )
