@@ -60,6 +60,13 @@ def open_archive(
                     f"{file} unpacks to {size >> 20} MB in {len(members)} members; at most {unpacked >> 20} MB in "
                     f"{BUDGET.members} are read as {what}. Cut it into pieces"
                 )
+            packed = file.stat().st_size  # zipfile asks for as many bytes as a member is said to take, there or not
+            for entry in members:
+                if entry.compress_size > packed or entry.header_offset > packed:
+                    raise error(
+                        f"{file} is damaged: {entry.filename[:80]!r} is said to take {entry.compress_size} of its "
+                        f"{packed} bytes; expected {what}"
+                    )
             yield archive
     except SydaError:
         raise
