@@ -21,7 +21,7 @@ def test_a_member_that_is_said_to_be_larger_than_its_archive_is_refused(tmp_path
     place = content.rfind(_LISTED)
     content[place + 20 : place + 24] = struct.pack("<I", 0xF8000000)  # 4 GB packed, which zipfile would make room for
     file.write_bytes(content)
-    with pytest.raises(StorageError, match="is damaged: 'second.npy' is said to take 4160749568 of its"):
+    with pytest.raises(StorageError, match=r"is damaged: 'second\.npy' is said to take 4160749568 of its"):
         read_arrays(file, "arrays")
 
 
