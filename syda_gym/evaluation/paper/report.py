@@ -253,7 +253,7 @@ def write_study(study: Study, out: str | os.PathLike[str], about: dict[str, str]
     folder = Path(out)
     for table in tables(study):
         write_text(folder / f"{_stem(table.title)}.csv", _csv([c.title for c in table.columns], table.rows))
-    cells = [asdict(cell) for cell in study.cells.values()]
+    cells = [asdict(study.cells[key]) for key in sorted(study.cells)]  # whoever finished first
     write_json(
         folder / "study.json",
         {

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from syda_gym.errors import MotionError, OptionError
 from syda_gym.evaluation.paper.cells import CONTENDERS, CellTask
 from syda_gym.evaluation.paper.few_shot import few_shot
-from syda_gym.evaluation.paper.report import PRINTED, overview, tables
+from syda_gym.evaluation.paper.report import PRINTED, overview, tables, write_study
 from syda_gym.evaluation.paper.results import Study
 from syda_gym.evaluation.paper.study import reproduce
 from syda_gym.mappings import METHODS
@@ -188,3 +189,11 @@ def test_the_real_recordings_give_the_known_figures(paper_dir):
         assert result.means[0] > 0.042, "below the noise floor: something leaks"
         assert result.errors_back is not None
         assert result.means[0] < result.errors_back.mean()
+
+
+def test_the_file_does_not_tell_in_which_order_the_parts_were_finished(studied, tmp_path):
+    study = studied[0]
+    assert len(study.cells) > 1
+    turned = replace(study, cells=dict(reversed(study.cells.items())))
+    one, other = (write_study(which, tmp_path / name, {}) for which, name in ((study, "one"), (turned, "other")))
+    assert (one / "study.json").read_bytes() == (other / "study.json").read_bytes()
