@@ -80,8 +80,9 @@ def start_page() -> str:
     ]
     for title, names in START.items():
         parts.append(f"\n## {title}\n")
-        # The rooms' pages own the anchors; here the same text stands a second time.
-        parts += [f"\n::: syda_gym.{name}\n    options:\n      heading_level: 3\n" for name in names]
+        # The rooms' pages own the anchors; here the same text stands a second time, and nothing links to it.
+        options = "      heading_level: 3\n      skip_local_inventory: true\n"
+        parts += [f"\n::: syda_gym.{name}\n    options:\n{options}" for name in names]
     return "".join(parts)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from syda_gym.embodiments.limb_ik.compiling import compiled
 
 __all__ = ["limit_clips"]
@@ -21,7 +23,19 @@ def _along(at, values, first, last, x):
 
 
 @compiled
-def limit_clips(clips, most, slack, lower, upper, governed, governors, rows, at, low, high):
+def limit_clips(
+    clips: np.ndarray,
+    most: np.ndarray,
+    slack: float,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    governed: np.ndarray,
+    governors: np.ndarray,
+    rows: np.ndarray,
+    at: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+) -> None:
     """Applies ``limits.step_towards`` from frame to frame, in place.
 
     Args:
