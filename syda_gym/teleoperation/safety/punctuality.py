@@ -14,7 +14,10 @@ SPACING = 0.7
 
 _RECENT = 16  # steps
 _RESERVE = 1.5  # how much later than ever lately a command may leave
-_MEMORY = 5.0  # s for which a late command makes the robot slower
+_MEMORY = 5.0  # s for which a late command makes the robot slower, for every second lately in which one was late
+_LONGEST_MEMORY = 40.0  # s
+_LATELY = 60.0  # s
+_LATE = 0.05  # periods; less is not counted as late
 _CAUTION = 5.0  # s at the beginning in which nobody knows yet how late commands will be
 
 
@@ -47,6 +50,7 @@ class Punctuality:
         self._lates: tuple[float, ...] = ()
         self._worst: tuple[tuple[float, float], ...] = ()  # time and lateness, each less than those before
         self._shortest: tuple[tuple[float, float], ...] = ()  # time and step, each longer than those before
+        self._late_seconds: tuple[int, ...] = ()  # those of the last minute in which a command was late
         self._careful_until: float | None = None
 
     def saw(self, now: float, step: float, late: float, known: bool) -> None:
@@ -60,15 +64,24 @@ class Punctuality:
         """
         self._lates = (*self._lates[1 - _RECENT :], late)
         self.least = max(0.0, min(self._lates))
+        memory = self._memory(now, late - self.least)
         extra = _RESERVE * (late - self.least)
-        self._worst = (*(one for one in self._worst if one[1] > extra and now - one[0] < _MEMORY), (now, extra))
-        self._shortest = (*(one for one in self._shortest if one[1] < step and now - one[0] < _MEMORY), (now, step))
+        self._worst = (*(one for one in self._worst if one[1] > extra and now - one[0] < memory), (now, extra))
+        self._shortest = (*(one for one in self._shortest if one[1] < step and now - one[0] < memory), (now, step))
         worst, shortest = self._worst[0][1], self._shortest[0][1]
         if known:
             self._careful_until = now + _CAUTION if self._careful_until is None else self._careful_until
             if now < self._careful_until:
                 worst, shortest = max(worst, self._period), min(shortest, SPACING * self._period)
         self.seconds = self._harmless(shortest + self.least, worst)
+
+    def _memory(self, now: float, extra: float) -> float:
+        """How long a late command counts [s]."""
+        second = math.floor(now)
+        if extra > _LATE * self._period and second not in self._late_seconds:
+            self._late_seconds = (*self._late_seconds, second)
+        self._late_seconds = tuple(one for one in self._late_seconds if now - one < _LATELY)
+        return min(_MEMORY * max(len(self._late_seconds), 1), _LONGEST_MEMORY)
 
     def _harmless(self, step: float, late: float) -> float:
         late = min(late, step * math.sqrt(2.0 * (1.0 - GENTLE)))  # more is not worse
