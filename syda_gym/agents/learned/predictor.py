@@ -26,7 +26,8 @@ class Predictor(Agent):
 
     The network sees two streams, the command from below and the base command itself: a filter below is smooth and late,
     the base command is rough and fresh, and what they differ by tells a turn from noise. It sees the level and change
-    of the command, its gaps to the base command and to the joint, and the packet age, over the last
+    of the command, its gaps to the base command (and to those to come, where a preview is shown) and to the joint, and
+    the packet age, over the last
     ``tcn.receptive_field()`` steps, and answers with a correction of at most ``bound``. It is trained by regression
     through the servo (see ``predictor_training``). A ``Lead`` belongs on top of it. Runs in numpy alone.
 
@@ -68,7 +69,7 @@ class Predictor(Agent):
         """Command plus correction."""
         last = np.where(self._fresh[:, None], command, self._last)
         self._last = command
-        inputs = network_inputs(self.interface, command, last, reading.base, reading.q, reading.age)
+        inputs = network_inputs(self.interface, command, last, reading.preview, reading.q, reading.age)
         return command + self.bound * np.tanh(self._network.step(inputs, self._fresh) / self.bound)
 
     @property
@@ -78,7 +79,7 @@ class Predictor(Agent):
 
 
 def network_inputs(
-    interface: Interface, command: FloatArray, last: FloatArray, base: FloatArray, q: FloatArray, age: FloatArray
+    interface: Interface, command: FloatArray, last: FloatArray, preview: FloatArray, q: FloatArray, age: FloatArray
 ) -> FloatArray:
     """What the network sees of one step.
 
@@ -86,7 +87,7 @@ def network_inputs(
         interface: for the robot's limits, by which levels are scaled to about [-1, 1].
         command: from the agent below, of this step ``(..., n)`` [rad].
         last: the same of the step before ``(..., n)`` [rad].
-        base: base command of this step ``(..., n)`` [rad].
+        preview: base commands of this step and of those to come ``(..., k + 1, n)`` [rad].
         q: joint angles ``(..., n)`` [rad].
         age: of the packet ``(...)`` [s].
 
@@ -98,7 +99,7 @@ def network_inputs(
     parts = [
         (command - centre) / half,
         (command - last) / STEP_SCALE,
-        (base - command) / GAP_SCALE,
+        ((preview - command[..., None, :]) / GAP_SCALE).reshape(*command.shape[:-1], -1),
         (q - command) / GAP_SCALE,
         np.asarray(age)[..., None] / AGE_SCALE,
     ]
@@ -107,4 +108,5 @@ def network_inputs(
 
 def input_count(interface: Interface) -> int:
     """Number of values of ``network_inputs``."""
-    return 4 * interface.n + 1
+    shown = interface.layout["base_error"]
+    return 3 * interface.n + (shown.stop - shown.start) + 1

@@ -241,7 +241,8 @@ class _Trainer:
             self._contact.renew(q_after)
         before = np.concatenate([self.streams.base[:, :1], q_after[:, :-1]], axis=1)
         last = np.concatenate([self._below[:, :1], self._below[:, :-1]], axis=1)
-        inputs = network_inputs(self.interface, self._below, last, self.streams.base, before, self.streams.age)
+        preview = self.streams.preview
+        inputs = network_inputs(self.interface, self._below, last, preview, before, self.streams.age)
         self._inputs = torch.as_tensor(inputs, dtype=torch.float32)
         self._before = torch.as_tensor(before, dtype=torch.float32)
 
@@ -330,11 +331,16 @@ def _motor_shares(streams: Streams, rates: Rates, config: PredictorConfig) -> Fl
 def _with_mirror(interface: Interface, streams: Streams) -> Streams:
     from syda_gym.agents.streams.streams import join
 
-    robot, shape = interface.robot, streams.base.shape
+    robot = interface.robot
+
+    def turned(array: FloatArray) -> FloatArray:
+        return robot.mirror(array.reshape(-1, array.shape[-1])).reshape(array.shape)
+
     mirrored = replace(
         streams,
-        base=robot.mirror(streams.base.reshape(-1, shape[-1])).reshape(shape),
-        reference=robot.mirror(streams.reference.reshape(-1, shape[-1])).reshape(shape),
+        base=turned(streams.base),
+        reference=turned(streams.reference),
+        ahead=None if streams.ahead is None else turned(streams.ahead),
     )
     return join([streams, mirrored])
 

@@ -82,6 +82,12 @@ class Streams:
         )
 
     @property
+    def preview(self) -> FloatArray:
+        """Base commands of every step and of those to come ``(E, T, k + 1, n)`` [rad]."""
+        now = self.base[:, :, None]
+        return now if self.ahead is None else np.concatenate([now, self.ahead], axis=2)
+
+    @property
     def mask(self) -> NDArray[np.bool_]:
         """Which steps belong to their episode ``(E, T)``."""
         return np.arange(self.base.shape[1])[None] < self.lengths[:, None]

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from syda_gym.agents.agent import BaseAlone
 from syda_gym.agents.classical.rivals import Lead, make_rival
+from syda_gym.agents.interface import Interface
 from syda_gym.agents.learned.predictor import Predictor, input_count, network_inputs
 from syda_gym.agents.learned.tcn import StreamingTcn, TcnShape, receptive_field
 from syda_gym.agents.predictor.network import TorchLandmarks, follow, initial_weights, response, tcn
 from syda_gym.agents.predictor.predictor_training import PredictorConfig, commands_below, train_predictor
-from syda_gym.agents.streams.streams import play_streams, score_streams
+from syda_gym.agents.streams.streams import Streams, play_streams, score_streams
 from syda_gym.errors import AgentError
 
 
@@ -120,8 +123,35 @@ def test_a_base_that_looks_at_joint_angles_is_refused(interface, noisy_streams, 
 
 def test_it_sees_the_base_command_beside_that_of_the_agent_below(interface):
     values = np.random.default_rng(5).normal(size=(4, interface.n))
-    one = network_inputs(interface, values[0], values[1], values[2], values[3], np.array(0.1))
-    other = network_inputs(interface, values[0], values[1], values[2] + 1.0, values[3], np.array(0.1))
+    one = network_inputs(interface, values[0], values[1], values[2:3], values[3], np.array(0.1))
+    other = network_inputs(interface, values[0], values[1], values[2:3] + 1.0, values[3], np.array(0.1))
     changed = np.flatnonzero(one != other)
     assert one.shape == (input_count(interface),)
     assert changed.tolist() == list(range(2 * interface.n, 3 * interface.n))
+
+
+def looking_ahead(interface: Interface, streams: Streams, steps: int) -> tuple[Interface, Streams]:
+    """The same episodes where the base commands to come are shown."""
+    n, shown = interface.n, slice(0, (steps + 1) * interface.n)
+    layout = {"base_error": shown}
+    for name, width in (("q", n), ("qd", n), ("packet_age", 1)):
+        start = list(layout.values())[-1].stop
+        layout[name] = slice(start, start + width)
+    size = list(layout.values())[-1].stop
+    times = np.arange(streams.base.shape[1])
+    later = np.minimum(times[:, None] + np.arange(1, steps + 1), times[-1])
+    return Interface(interface.robot, layout, size, interface.dt, interface.alpha), replace(
+        streams, ahead=streams.base[:, later]
+    )
+
+
+def test_commands_to_come_are_seen_and_help_against_noise(interface, noisy_streams, rates):
+    config = PredictorConfig(iterations=60, rounds=1, batch=16, channels=24, averaging=0.9)
+    ahead, _ = looking_ahead(interface, noisy_streams[0], 3)
+    train, test = (looking_ahead(interface, streams, 3)[1] for streams in noisy_streams)
+    assert input_count(ahead) == input_count(interface) + 3 * interface.n
+    learned = [
+        train_predictor(BaseAlone(one), *streams, rates, config, seed=0).history[-1].objective
+        for one, streams in ((ahead, (train, test)), (interface, noisy_streams))
+    ]
+    assert learned[0] < 0.97 * learned[1]
