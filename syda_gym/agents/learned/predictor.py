@@ -109,4 +109,4 @@ def network_inputs(
 def input_count(interface: Interface) -> int:
     """Number of values of ``network_inputs``."""
     shown = interface.layout["base_error"]
-    return 3 * interface.n + (shown.stop - shown.start) + 1
+    return 3 * interface.n + int(shown.stop - shown.start) + 1

@@ -24,6 +24,7 @@ from syda_gym.cli.options import (
 from syda_gym.cli.shared import bar, console, interruptible, print_json, say_written
 
 if TYPE_CHECKING:
+    from syda_gym.agents.training import Comparison
     from syda_gym.agents.work import TrainingReport
 
 __all__ = ["evaluate", "export", "play", "train"]
@@ -199,7 +200,7 @@ def _print_verdict(report: TrainingReport) -> None:
     comparison, say = report.comparison, console()
     if report.best == 0:
         say.print(
-            f"nothing was gained: the base is kept; try {advice(comparison.best_other)}",
+            f"nothing was gained: the base is kept; try {advice(comparison)}",
             style="bold red", markup=False, soft_wrap=True,
         )  # fmt: skip
         return
@@ -213,14 +214,19 @@ def _print_verdict(report: TrainingReport) -> None:
     else:
         words = (
             f"{comparison.best_other!r} is better without training ({other:.2f} against {mine:.2f}); take it, or try "
-            "--base stack or more --steps"
+            f"{_other_trainings(comparison)}"
         )
         say.print(words, style="bold red", markup=False, soft_wrap=True)
 
 
-def advice(best: str) -> str:
+def advice(comparison: Comparison) -> str:
     """What to try after a training that gained nothing."""
-    return f"more --steps, another --seed, --base stack, or take `{best}`, the best of the others, as it is"
+    return f"{_other_trainings(comparison)}, or take `{comparison.best_other}`, the best of the others, as it is"
+
+
+def _other_trainings(comparison: Comparison) -> str:
+    on_predictor = any("predictor" in name for name in comparison.figures)
+    return "more --steps, another --seed" if on_predictor else "--base stack, more --steps"
 
 
 def _where_to_go_on(out: Path, kind: str) -> str:
