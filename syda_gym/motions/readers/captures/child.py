@@ -7,6 +7,7 @@ to a file, which is read as any stranger's file is.
 from __future__ import annotations
 
 import importlib.util
+import os
 import subprocess
 import sys
 import tempfile
@@ -21,7 +22,8 @@ from syda_gym.files import read_arrays
 
 __all__ = ["arrays_from_child"]
 
-_SECONDS = 60.0  # on the wall; the child ends itself after 20 s of processor time
+_SECONDS = 60.0  # on the wall; the child ends itself after 4 to 20 s of processor time
+_ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}  # threads reserve memory by the core
 _MISSING, _REFUSED = 3, 4  # exit codes of ``in_child``
 
 
@@ -55,7 +57,9 @@ def arrays_from_child(script: str, path: Path, feature: str, extra: str, library
             str(out),
         ]
         try:
-            done = subprocess.run(command, capture_output=True, timeout=_SECONDS, check=False)
+            done = subprocess.run(
+                command, capture_output=True, timeout=_SECONDS, check=False, env={**os.environ, **_ONE_THREAD}
+            )
         except subprocess.TimeoutExpired as error:
             raise MotionError(f"{path} takes too long to open; it is damaged or far too large") from error
         except OSError as error:

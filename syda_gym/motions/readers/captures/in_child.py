@@ -12,19 +12,26 @@ __all__: list[str] = []
 _MISSING, _REFUSED = 3, 4  # ``child`` knows these codes
 
 
-def _limit() -> None:
-    """At most 20 s of processor time and 4 GB of addresses."""
+_BYTES_PER_SECOND = 4e6  # the slowest opener is faster than this
+
+
+def _limit(path: Path) -> None:
+    """Processor time and addresses by what a sound file of this size needs: 4 s and 1 GB, at most 20 s and 4 GB."""
     try:
         import resource
     except ImportError:  # there is none outside of Unix
         return
-    resource.setrlimit(resource.RLIMIT_CPU, (20, 20))
-    resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+    parts = path.rglob("*") if path.is_dir() else [path]
+    size = sum(part.stat().st_size for part in parts if part.is_file())
+    seconds = min(4 + round(size / _BYTES_PER_SECOND), 20)
+    memory = min((1 << 30) + 16 * size, 4 << 30)
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _main(script: str, path: str, out: str) -> int:
-    _limit()
+    _limit(Path(path))
     spec = importlib.util.spec_from_file_location(script, Path(__file__).with_name(f"{script}.py"))
     if spec is None or spec.loader is None:
         return _REFUSED

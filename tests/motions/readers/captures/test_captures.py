@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,18 @@ def test_damaged_c3d_ends_nothing_but_its_own_process(tmp_path: Path) -> None:
         path.write_bytes(bytes(damaged))
         with contextlib.suppress(MotionError):
             assert np.isfinite(load_motions(path).takes[0].frames["operator"]).all()
+
+
+def test_a_c3d_whose_parameters_lead_in_a_circle_is_refused_within_seconds(tmp_path: Path) -> None:
+    data = bytearray(_c3d(tmp_path / "walk.c3d").read_bytes())
+    at = data.index(b"DESCRIPTIONS") + len(b"DESCRIPTIONS")  # there the way to the next parameter is written
+    data[at : at + 2] = b"\xf0\xff"
+    path = tmp_path / "circle.c3d"
+    path.write_bytes(bytes(data))
+    began = time.perf_counter()
+    with pytest.raises(MotionError, match="damaged or too large"):
+        load_motions(path)
+    assert time.perf_counter() - began < 30.0, "it takes four seconds of processor time, on busy cores more"
 
 
 def test_without_the_library_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,3 +207,22 @@ def test_a_damaged_bag(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:2_000])
     with pytest.raises(MotionError, match=r"cut\.bag is damaged or too large"):
         load_motions(path)
+
+
+@pytest.mark.parametrize("claimed", [0, 1 << 20, 1 << 36, (1 << 63) - 1])
+def test_an_mcap_whose_chunks_lie_about_their_size(tmp_path: Path, claimed: int) -> None:
+    folder = _bag2(tmp_path / "recorded", "MCAP")
+    data = bytearray(next(folder.glob("*.mcap")).read_bytes())
+    # The first chunk: opcode 6, length, first and last time, size of its content, checksum, compression.
+    at = 8
+    while data[at] != 6:
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+    data[at + 9 + 16 : at + 9 + 24] = claimed.to_bytes(8, "little")
+    path = tmp_path / "lying.mcap"
+    path.write_bytes(bytes(data))
+    began = time.perf_counter()
+    try:
+        assert _degrees(load_motions(path)) < 0.2, "what is not compressed can be read all the same"
+    except MotionError as error:
+        assert "damaged or too large" in str(error) or "nobody is in it" in str(error)
+    assert time.perf_counter() - began < 30.0
