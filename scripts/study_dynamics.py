@@ -3,7 +3,7 @@
     python scripts/study_dynamics.py --out study-dynamics --seeds 5                 # finished parts are kept
     python scripts/study_dynamics.py --out study-dynamics --seeds 5 --stages tune   # one part
 
-Motors at 65 to 100 % of their gain and speed, up to 0.6 kg in each hand and friction that eats up to half of the effort
+Motors at 65 to 100 % of their gain and speed, up to 0.6 kg in each hand and friction that eats up to 30 % of the effort
 are drawn anew for every episode and change within it (``disturbances="dynamics"``); nobody is told.
 
 1. `tune`: lead, Kalman filter with lead and adaptive lead, on training motions, in Bullet.
@@ -46,11 +46,11 @@ STAGES = ("tune", "predict", "policy", "test", "report")
 RANGES = {
     "lead": {"strength": Range(0.5, 2.0)},
     "kalman": {**RIVALS["kalman"].ranges, "strength": Range(0.5, 2.0)},
-    "adaptive_lead": RIVALS["adaptive_lead"].ranges,
+    "adaptive_lead": {**RIVALS["adaptive_lead"].ranges, "strength": Range(0.7, 1.5)},
 }
 """A lead may be stronger than the nominal one here, since motors are never stronger than nominal."""
 
-BUDGET = {"lead": 10, "kalman": 16, "adaptive_lead": 14}
+BUDGET = {"lead": 10, "kalman": 32, "adaptive_lead": 48}
 EVERY = 3  # of the training motions, for tuning
 HISTORY = 4
 VARIANTS = 4

@@ -29,15 +29,20 @@ class AdaptiveLead(Agent):
     cut to what a joint can cover in one step and still come to rest at the command with the deceleration ``braking``
     times that of the free arm (``scripts/fit_servo.py``).
 
+    Where a joint cannot keep up, as in a jump of the command, the others of its arm wait for it, so that the arm goes
+    straight for its goal as it does without a lead: joints that arrive one after the other lead a hand astray.
+
     It must be the topmost of its stack, since it takes what it asks for as what was asked of the motors.
 
     Args:
         interface: robot, rate, motors and observation layout.
         base: the agent below.
-        strength: share of the lead, 0 to 1.
+        strength: share of the lead, 0 to 1.5; above 1 for motors that are slower than their share says.
         memory: share of the past that is kept from one step to the next, 0 to below 1.
         least: the smallest share that is believed, in shares of the nominal one.
         braking: share of the free arm's acceleration that is counted on for slowing down; 0 counts on any.
+        together: share of its top speed that a joint is counted on to have where the others wait for it; 0 waits for
+            none. Above 1 only where the joint is far behind.
 
     Raises:
         AgentError: a setting out of range.
@@ -54,15 +59,17 @@ class AdaptiveLead(Agent):
         memory: float = 0.9,
         least: float = 0.6,
         braking: float = 0.6,
+        together: float = 1.25,
     ) -> None:
         super().__init__(interface, base)
-        if not (0.0 <= strength <= 1.0 and 0.0 <= memory < 1.0 and 0.1 <= least <= 1.0 and 0.0 <= braking <= 10.0):
-            raise AgentError(
-                "expected 0 <= strength <= 1, 0 <= memory < 1, 0.1 <= least <= 1 and 0 <= braking <= 10, got "
-                f"{strength}, {memory}, {least} and {braking}"
-            )
+        for name, value, low, high in (
+            ("strength", strength, 0.0, 1.5), ("memory", memory, 0.0, 0.999), ("least", least, 0.1, 1.0),
+            ("braking", braking, 0.0, 10.0), ("together", together, 0.0, 10.0),
+        ):  # fmt: skip
+            if not low <= value <= high:
+                raise AgentError(f"{self.name}: {name} must lie between {low:g} and {high:g}, got {value}")
         self.strength, self.memory = float(strength), float(memory)
-        self.least, self.braking = float(least), float(braking)
+        self.least, self.braking, self.together = float(least), float(braking), float(together)
         robot = interface.robot
         self._farthest = robot.speed * interface.dt / interface.alpha
         acceleration = servo_constants(robot.name, robot.joint_names).acceleration
@@ -78,7 +85,7 @@ class AdaptiveLead(Agent):
         """``q + (1 + strength (1 / a - 1)) way`` with the share ``a`` that was measured."""
         q, share = reading.q, self._share(reading.q)
         way = self._braked(command - q)
-        wanted = q + (1.0 + self.strength * (1.0 / share - 1.0))[:, None] * way
+        wanted = q + self._in_step((1.0 + self.strength * (1.0 / share - 1.0))[:, None] * way)
         self._from, self._asked = q, limited(self.interface, wanted, command, q)
         return wanted
 
@@ -104,7 +111,17 @@ class AdaptiveLead(Agent):
         most = np.sqrt(half**2 + 2.0 * self._slowing * np.abs(way)) - half
         return np.asarray(np.sign(way) * np.minimum(np.abs(way), most))
 
+    def _in_step(self, reach: FloatArray) -> FloatArray:
+        """How far ``(B, n)`` the joints of each arm are asked to go, all by the share that the slowest can manage."""
+        if not self.together:
+            return reach
+        result = reach.copy()
+        for arm in self.interface.robot.arm_slices:
+            far = np.abs(reach[:, arm]) / (self.together * self._farthest[arm])
+            result[:, arm] /= np.maximum(far.max(axis=1, initial=0.0), 1.0)[:, None]
+        return result
+
     @property
     def settings(self) -> dict[str, Any]:
-        """``strength``, ``memory``, ``least`` and ``braking``."""
-        return {"strength": self.strength, "memory": self.memory, "least": self.least, "braking": self.braking}
+        """``strength``, ``memory``, ``least``, ``braking`` and ``together``."""
+        return {name: getattr(self, name) for name in ("strength", "memory", "least", "braking", "together")}

@@ -238,6 +238,10 @@ class Rival:
 
 
 _STRENGTH = {"strength": Range(0.0, 1.0)}
+_ADAPTIVE = {
+    "memory": Range(0.5, 0.98), "least": Range(0.4, 1.0), "braking": Range(0.3, 3.0, log=True),
+    "together": Range(0.9, 2.0, log=True), "strength": Range(0.0, 1.5),
+}  # fmt: skip
 _EURO = {"min_cutoff": Range(0.1, 10.0, log=True), "beta": Range(0.01, 30.0, log=True)}
 _KALMAN = {"process": Range(0.5, 500.0, log=True), "horizon": Range(0.0, 0.4)}
 
@@ -285,7 +289,7 @@ RIVALS: Mapping[str, Rival] = {
     "adaptive_lead": Rival(
         "lead by the share that the motors were seen to cover, which brakes in time",
         _adaptive_lead,
-        {"memory": Range(0.5, 0.98), "least": Range(0.4, 1.0), "braking": Range(0.3, 3.0, log=True)} | _STRENGTH,
+        _ADAPTIVE,
     ),
     "one_euro": Rival("One-Euro filter", lambda i, **s: OneEuro(i, BaseAlone(i), **s), _EURO),
     "one_euro_lead": Rival("One-Euro filter, then lead", _one_euro_lead, _EURO | _STRENGTH),

@@ -72,13 +72,30 @@ def test_a_loaded_arm_that_brakes_in_time_overshoots_less(interface, rates):
     assert peaks[1] < 0.6 * peaks[0]
 
 
+def test_after_a_jump_the_joints_of_an_arm_arrive_together(interface, rates):
+    robot, steps = interface.robot, 30
+    target = robot.rest.copy()
+    pitch, roll = (list(robot.joint_names).index(name) for name in ("LShoulderPitch", "LShoulderRoll"))
+    far, near = target[pitch] - 1.2, target[roll] + 0.4
+    path = np.repeat(target[None], steps, axis=0)
+    path[3:, pitch], path[3:, roll] = far, near
+    stream = Streams(path[None], np.zeros((1, steps)), path[None], np.array([steps]))
+    ahead = []
+    for together in (0.0, 1.0):
+        q = play_streams(AdaptiveLead(interface, BaseAlone(interface), together=together), stream, rates)[0]
+        done = (q - target)[:, [pitch, roll]] / np.array([far - target[pitch], near - target[roll]])
+        ahead.append(np.abs(done[:, 0] - done[:, 1]).max())
+    assert ahead[0] > 0.2, "without waiting the joint with the shorter way is there first"
+    assert ahead[1] < 0.5 * ahead[0]
+
+
 def test_it_is_a_rival_by_name_is_stored_and_refuses_nonsense(interface):
     agent = make_rival("adaptive_lead", interface, memory=0.7, least=0.8, braking=0.5)
     assert agent.stack == ("base", "adaptive_lead")
     again = build_stack(interface, stack_spec(agent))
     assert again.settings == agent.settings
-    for name, value in (("memory", 1.0), ("least", 0.0), ("braking", -1.0), ("strength", 2.0)):
-        with pytest.raises(AgentError, match="expected 0 <= strength"):
+    for name, value in (("memory", 1.0), ("least", 0.0), ("braking", -1.0), ("strength", 2.0), ("together", -1.0)):
+        with pytest.raises(AgentError, match=f"{name} must lie between"):
             make_rival("adaptive_lead", interface, **{name: value})
 
 
