@@ -36,7 +36,7 @@ CELLS = (
     ("full", "test"),
     ("full", "harsh"),
 )
-RIVALS = ("base", "lead", "one_euro", "one_euro_lead", "ema_lead", "kalman")
+RIVALS = ("base", "lead", "adaptive_lead", "one_euro", "one_euro_lead", "ema_lead", "kalman")
 STACK_BARS = {
     ("lag", "test"): 1.0,
     ("noise", "test"): 1.0,

@@ -51,7 +51,7 @@ RANGES = {
 """A lead may be stronger than the nominal one here, since motors are never stronger than nominal."""
 
 BUDGET = {"lead": 10, "kalman": 32, "adaptive_lead": 48}
-EVERY = 3  # of the training motions, for tuning
+EVERY = 1  # of the training motions, for tuning: with a third of them two jumps of the mapping decided
 HISTORY = 4
 VARIANTS = 4
 EPISODES = 160
