@@ -42,6 +42,7 @@ from syda_gym.motions.synthetic.generator import generate
 TRAIN = ("reach", "point", "lift", "push", "work", "circle")
 VALIDATION = ("swing", "bow", "wave")
 TEST = ("cross", "clap", "signal")
+TEST_MOTIONS = 103  # seed
 STAGES = ("tune", "predict", "policy", "test", "report")
 RANGES = {
     "lead": {"strength": Range(0.5, 2.0)},
@@ -182,12 +183,12 @@ def train_policies(out: Path, seeds: int, only: int | None = None) -> None:
         print(path.name, about, flush=True)
 
 
-def judge(out: Path, seeds: int, only: str | None = None) -> None:
-    """Every agent on the test motions, or one of them, in Bullet; what was played is kept agent by agent."""
-    interface, judged = interface_of(TEST, 103), in_bullet(TEST, 103, "test")
+def judge(out: Path, seeds: int, motions: int, only: str | None = None) -> None:
+    """Every agent on the test motions of a seed, or one of them, in Bullet; what was played is kept agent by agent."""
+    interface, judged = interface_of(TEST, motions), in_bullet(TEST, motions, "test")
     names = list(rivals(out, interface)) + [f"{kind}-{seed}" for kind in LEARNED for seed in range(seeds)]
     for name in names if only is None else [only]:
-        path = out / "test" / f"{name}.json"
+        path = played(out, motions) / f"{name}.json"
         if not path.is_file():
             agent = load_agent(out / name, interface) if name not in RIVALS else rivals(out, interface)[name]
             results = evaluate(judged, {name: agent}, draws=DRAWS, seed=9000)[name]
@@ -195,17 +196,23 @@ def judge(out: Path, seeds: int, only: str | None = None) -> None:
             print(name, mean_of(results).as_dict(), flush=True)
 
 
-def report(out: Path, seeds: int) -> None:
+def played(out: Path, motions: int) -> Path:
+    """Folder of what was played on the test motions of a seed."""
+    return out / "test" if motions == TEST_MOTIONS else out / f"test-{motions}"
+
+
+def report(out: Path, seeds: int, motions: int) -> None:
     """Prints the table of the study and writes everything that is known."""
-    rows = {name: read_json(out / "test" / f"{name}.json") for name in ("base", *RANGES)}
+    folder = played(out, motions)
+    rows = {name: read_json(folder / f"{name}.json") for name in ("base", *RANGES)}
     for kind in LEARNED:
-        played = [read_json(out / "test" / f"{kind}-{seed}.json") for seed in range(seeds)]
-        rows[kind] = [row for found in played for row in found]
+        found_by_seed = [read_json(folder / f"{kind}-{seed}.json") for seed in range(seeds)]
+        rows[kind] = [row for found in found_by_seed for row in found]
     listed = [name for name in rows if name not in ("policy", "adaptive_lead")]
     best = min(listed, key=lambda name: float(np.mean([row["J"] for row in rows[name]])))
     table = {name: _summary(found, rows[best]) for name, found in rows.items()}
     result = {
-        "command": f"python scripts/study_dynamics.py --out study-dynamics --seeds {seeds}",
+        "command": f"python scripts/study_dynamics.py --out study-dynamics --seeds {seeds} --test-motions {motions}",
         "bar": BAR,
         "best_rival": best,
         "test_in_bullet": table,
@@ -216,7 +223,7 @@ def report(out: Path, seeds: int) -> None:
         "policy_stands_on": read_json(out / "policy-0.json")["stack"],
         "test_motions": rows,
     }
-    write_json(out / "table.json", result)
+    write_json(out / ("table.json" if motions == TEST_MOTIONS else f"table-{motions}.json"), result)
     print(f"| agent | landmark error [mm] | joint error [mrad] | jitter | J | of {best} | median over motions |")
     print("|---|---|---|---|---|---|---|")
     for name, row in table.items():
@@ -248,14 +255,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("study-dynamics"))
     parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--test-motions", type=int, default=TEST_MOTIONS, help="seed of the generated test motions")
     parser.add_argument("--stages", nargs="+", choices=STAGES, default=STAGES)
     given = parser.parse_args()
     stages = {
         "tune": lambda: tune_rivals(given.out),
         "predict": lambda: predict(given.out, given.seeds),
         "policy": lambda: train_policies(given.out, given.seeds),
-        "test": lambda: judge(given.out, given.seeds),
-        "report": lambda: report(given.out, given.seeds),
+        "test": lambda: judge(given.out, given.seeds, given.test_motions),
+        "report": lambda: report(given.out, given.seeds, given.test_motions),
     }
     for stage in given.stages:
         stages[stage]()
