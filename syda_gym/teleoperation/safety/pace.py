@@ -51,6 +51,7 @@ class Pace:
         self._faster = 1.0  # how many times faster it may have been
         self._lasts = 0.0  # how long the next step will last on the wire [s]
         self._braking = 0.0  # how much time the velocity has to fall [s]
+        self._stalled = False  # whether it stands because nothing came
         self._step = np.zeros(joints)  # the last command less the one before
         self._planned = np.zeros(joints)
         self._before: float | None = None  # when the command before the last one had left
@@ -84,7 +85,8 @@ class Pace:
         self.change = 0.5 * (shortest + self.dt)
         self._lasts = now - first + self.punctuality.least
         self._braking = 0.5 * (shortest + self._lasts)
-        if passed > _STALL * self._period:  # nothing came for so long that the robot has come to rest
+        self._stalled = passed > _STALL * self._period
+        if self._stalled:  # nothing came for so long that the robot has come to rest
             self.velocity = np.zeros_like(self.velocity)
             self.acceleration = np.zeros_like(self.velocity)
             self.change = self.dt
@@ -117,10 +119,16 @@ class Pace:
         """What a wire that is not punctual leaves of a step: a velocity not to fall below, and a greatest speed.
 
         Below the first, joints ``(n,)`` [rad/s] would brake harder than ``most`` ``(n,)`` [rad/s^2] by what the wire
-        sees. Faster than the second ``(n,)`` [rad/s], a late command would do harm.
+        sees. Faster than the second ``(n,)`` [rad/s], a late command would do harm. After a stall, it is also what the
+        wire lets a robot have that turns round: it sees the step before the stall and the one after it, and not that
+        the robot stood still between them.
         """
-        slowed = self.slowed(most)
-        return slowed, np.maximum(most / GENTLE * self.punctuality.seconds, np.abs(slowed))
+        slowed, limit = self.slowed(most), most / GENTLE
+        harmless = limit * self.punctuality.seconds
+        if self._stalled:
+            turned = (limit * self._braking - self._faster * np.abs(self._was)) * self._lasts / max(self.dt, _TINY)
+            harmless = np.minimum(harmless, np.maximum(turned, 0.0))
+        return slowed, np.maximum(harmless, np.abs(slowed))
 
     def end(self, now: float, step: FloatArray) -> None:
         """The command was found: the last one plus ``step`` ``(n,)`` [rad]."""

@@ -78,13 +78,13 @@ def wire(robot: Robot, rng: np.random.Generator, rate: float, count: int) -> tup
     for index in range(count):
         wait = max(SPACING, rng.exponential(0.5) + 0.5) * period
         clock = (clock if left is None else left + wait) + rng.exponential(2e-4)
-        clock += float(rng.choice([0.0, rng.uniform(0.0, 0.01), rng.choice([0.02, 0.1, 1.0])], p=[0.96, 0.03, 0.01]))
+        clock += float(rng.choice([0.0, rng.uniform(0.0, 0.01), rng.choice([0.02, 0.1, 1.0])], p=[0.94, 0.04, 0.02]))
         motion.begin(clock, left, leaving)
         if index % 15 == 0:
             goal = robot.clamp(rng.uniform(robot.lower, robot.upper))[0]
         motion.follow(goal, 1.0)
         took = rng.uniform(8e-4, 1.8e-3)
-        took += float(rng.choice([0.0, rng.uniform(0.0, 0.01), rng.choice([0.02, 0.1])], p=[0.96, 0.03, 0.01]))
+        took += float(rng.choice([0.0, rng.uniform(0.0, 0.01), rng.choice([0.02, 0.1])], p=[0.94, 0.04, 0.02]))
         leaving = clock + took
         clock = left = leaving + rng.uniform(5e-5, 1.2e-4)
         times.append(rng.uniform(leaving, left))
@@ -93,12 +93,14 @@ def wire(robot: Robot, rng: np.random.Generator, rate: float, count: int) -> tup
 
 
 @pytest.mark.parametrize("rate", [30.0, 60.0])
-def test_accelerations_hold_on_a_wire_that_is_late(pepper: Robot, rate: float) -> None:
-    times, path, most = wire(pepper, np.random.default_rng(int(rate)), rate, 1200)
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_accelerations_hold_on_a_wire_that_is_late(pepper: Robot, rate: float, seed: int) -> None:
+    times, path, most = wire(pepper, np.random.default_rng(seed), rate, 1500)
     dt = np.diff(times)
     velocity = np.diff(path, axis=0) / dt[:, None]
     change = np.abs(np.diff(velocity, axis=0)) / (0.5 * (dt[1:] + dt[:-1]))[:, None]
     first = int(np.searchsorted(times, 2.0))  # it has to be late once to be known as late
     assert (np.abs(velocity) <= pepper.speed * (1 + 1e-9)).all()
-    assert (change[first:] <= 1.02 * most).all()
+    # Turning round after a stall included: 1.17 where the stand between the two steps was taken for the wire's view.
+    assert (change[first:] <= 1.01 * most).all()
     assert np.abs(np.diff(path, axis=0)).sum() > 20.0, "it does move"
