@@ -51,9 +51,11 @@ BUNDLES = {
     "SydaTeleopContacts-v0": "adult-pepper-contacts",
 }
 CLASSICAL = ("base", "lead", "kalman")
-ROWS = (*CLASSICAL, "projection_lead", "predictor", "residual", "ppo", "sac")
+TOUCHING = ("projection_lead", "sliding_lead")  # where contacts count
+ROWS = (*CLASSICAL, *TOUCHING, "predictor", "residual", "ppo", "sac")
 LABELS = {
     "base": "base", "lead": "lead", "kalman": "Kalman filter, tuned", "projection_lead": "projection, then lead",
+    "sliding_lead": "lead, then sliding",
     "predictor": "predictor, shipped", "residual": "predictor, then residual, shipped",
     "ppo": "PPO from scratch", "sac": "SAC from scratch",
 }  # fmt: skip
@@ -76,7 +78,7 @@ def random(member: Member) -> bool:
 
 def agent_of(member: Member, row: str, interface: Interface) -> Agent | None:
     """A formula or a shipped agent; ``None`` where the id has none."""
-    if row in CLASSICAL or (row == "projection_lead" and member.options.get("self_collision")):
+    if row in CLASSICAL or (row in TOUCHING and member.options.get("self_collision")):
         return find_agent(row, interface, member.options.get("disturbances"))
     bundle = BUNDLES.get(member.id)
     if row not in ("predictor", "residual") or bundle not in shipped_agents():
