@@ -45,6 +45,7 @@ STACK_BARS = {
     ("full", "test"): 0.98,
     ("full", "harsh"): 1.0,
 }
+COLUMNS = 4  # of learning curves
 Rows = Mapping[str, Sequence[Mapping[str, Any]]]
 
 
@@ -247,7 +248,7 @@ def curve_picture(cells: Mapping[tuple[str, str], Cell], path: Path) -> None:
         for name in cell.conditions():
             x, y = iqm(cell.values(name, "jitter")), iqm(cell.values(name, "landmark_mm"))
             learned = any(kind in name for kind in ("predictor", "residual", "stack"))
-            colour = plt.cm.tab10(every.index(name) % 10)
+            colour = plt.cm.tab20(every.index(name) % 20)
             axis.scatter(
                 x, y, s=90 if learned else 50, marker="*" if learned else "o", color=colour, zorder=3, label=name
             )
@@ -258,8 +259,8 @@ def curve_picture(cells: Mapping[tuple[str, str], Cell], path: Path) -> None:
     found = {
         label: handle for axis in axes.ravel() for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
     }
-    figure.legend([found[name] for name in every], every, loc="lower center", ncols=len(every), fontsize=8)
-    figure.tight_layout(rect=(0.0, 0.04, 1.0, 1.0))
+    figure.legend([found[name] for name in every], every, loc="lower center", ncols=(len(every) + 1) // 2, fontsize=8)
+    figure.tight_layout(rect=(0.0, 0.06, 1.0, 1.0))
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
     plt.close(figure)
@@ -273,8 +274,11 @@ def learning_picture(study: Path, path: Path) -> None:
     for file in sorted(study.glob("*/*-[0-9].json")):
         curve = read_json(file)["figures"]["validation_curve"]
         groups[f"{file.parent.name}: {file.stem[:-2]}"].append([float(point["J"]) for point in curve])
-    figure, axes = plt.subplots(1, max(len(groups), 1), figsize=(3.2 * max(len(groups), 1), 3.4), squeeze=False)
-    for axis, (name, curves) in zip(axes[0], groups.items(), strict=False):
+    rows = max(-(-len(groups) // COLUMNS), 1)
+    figure, axes = plt.subplots(rows, COLUMNS, figsize=(3.2 * COLUMNS, 3.0 * rows), squeeze=False)
+    for axis in axes.flat[len(groups) :]:
+        axis.remove()
+    for axis, (name, curves) in zip(axes.flat, groups.items(), strict=False):
         for seed, curve in enumerate(curves):
             axis.plot(np.linspace(0, 1, len(curve)), curve, marker="o", ms=3, label=f"seed {seed}")
         axis.set_title(name, fontsize=9)
