@@ -12,13 +12,15 @@ GENTLE = 0.7
 SPACING = 0.7
 """Share of the period by which two commands are kept apart at the least, where frames come unevenly."""
 
-_RECENT = 16  # steps
 _RESERVE = 1.5  # how much later than ever lately a command may leave
 _MEMORY = 5.0  # s for which a late command makes the robot slower, for every second lately in which one was late
 _LONGEST_MEMORY = 40.0  # s
 _LATELY = 60.0  # s
 _LATE = 0.05  # periods; less is not counted as late
 _CAUTION = 5.0  # s at the beginning in which nobody knows yet how late commands will be
+
+Remembered = tuple[tuple[float, float], ...]
+"""Times [s] and what was so then [s]; the first is what counts."""
 
 
 class Punctuality:
@@ -39,7 +41,7 @@ class Punctuality:
         period: of the loop [s].
 
     Attributes:
-        least: how late every command leaves [s].
+        least: how late every command has left lately [s].
         seconds: a joint may be as fast as it gets in this time by its greatest acceleration [s].
     """
 
@@ -47,9 +49,9 @@ class Punctuality:
         self._period = period
         self.least = 0.0
         self.seconds = math.inf
-        self._lates: tuple[float, ...] = ()
-        self._worst: tuple[tuple[float, float], ...] = ()  # time and lateness, each less than those before
-        self._shortest: tuple[tuple[float, float], ...] = ()  # time and step, each longer than those before
+        self._latest: Remembered = ()  # how late, each less than those before
+        self._soonest: Remembered = ()  # how late, each more than those before
+        self._shortest: Remembered = ()  # steps, each longer than those before
         self._late_seconds: tuple[int, ...] = ()  # those of the last minute in which a command was late
         self._careful_until: float | None = None
 
@@ -62,13 +64,12 @@ class Punctuality:
             late: how much longer it took, at the most [s].
             known: whether the source knows when commands leave.
         """
-        self._lates = (*self._lates[1 - _RECENT :], late)
-        self.least = max(0.0, min(self._lates))
         memory = self._memory(now, late - self.least)
-        extra = _RESERVE * (late - self.least)
-        self._worst = (*(one for one in self._worst if one[1] > extra and now - one[0] < memory), (now, extra))
+        self._latest = (*(one for one in self._latest if one[1] > late and now - one[0] < memory), (now, late))
+        self._soonest = (*(one for one in self._soonest if one[1] < late and now - one[0] < memory), (now, late))
         self._shortest = (*(one for one in self._shortest if one[1] < step and now - one[0] < memory), (now, step))
-        worst, shortest = self._worst[0][1], self._shortest[0][1]
+        self.least = max(0.0, self._soonest[0][1])
+        worst, shortest = _RESERVE * (self._latest[0][1] - self.least), self._shortest[0][1]
         if known:
             self._careful_until = now + _CAUTION if self._careful_until is None else self._careful_until
             if now < self._careful_until:
