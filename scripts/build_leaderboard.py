@@ -52,10 +52,10 @@ BUNDLES = {
 }
 CLASSICAL = ("base", "lead", "kalman")
 TOUCHING = ("projection_lead", "sliding_lead")  # where contacts count
-ROWS = (*CLASSICAL, *TOUCHING, "predictor", "residual", "ppo", "sac")
+ROWS = (*CLASSICAL, *TOUCHING, "shipped", "predictor", "residual", "ppo", "sac")
 LABELS = {
     "base": "base", "lead": "lead", "kalman": "Kalman filter, tuned", "projection_lead": "projection, then lead",
-    "sliding_lead": "lead, then sliding",
+    "sliding_lead": "lead, then sliding", "shipped": "shipped: no network, a filter and a lead",
     "predictor": "predictor, shipped", "residual": "predictor, then residual, shipped",
     "ppo": "PPO from scratch", "sac": "SAC from scratch",
 }  # fmt: skip
@@ -81,9 +81,11 @@ def agent_of(member: Member, row: str, interface: Interface) -> Agent | None:
     if row in CLASSICAL or (row in TOUCHING and member.options.get("self_collision")):
         return find_agent(row, interface, member.options.get("disturbances"))
     bundle = BUNDLES.get(member.id)
-    if row not in ("predictor", "residual") or bundle not in shipped_agents():
+    if row not in ("shipped", "predictor", "residual") or bundle not in shipped_agents():
         return None
     agent = find_agent(str(bundle), interface)
+    if (row == "shipped") == ("predictor" in agent.stack):
+        return None
     taught = isinstance(agent, ResidualPolicy)
     if row == "residual":
         return agent if taught else None
@@ -107,7 +109,7 @@ def key_of(member: Member, row: str, seed: int, played: Sequence[str]) -> str:
     }  # fmt: skip
     if row in ("ppo", "sac"):
         depends["settings"] = settings_of(row, member)
-    elif row in ("predictor", "residual"):
+    elif row in ("shipped", "predictor", "residual"):
         files = sorted(asset("agents").glob(f"{BUNDLES.get(member.id)}.*"))
         depends["bundle"] = fingerprint(*(path.read_bytes() for path in files))
     else:

@@ -50,7 +50,7 @@ FAMILY: tuple[Member, ...] = (
     Member(
         "SydaTeleopLatency-v0",
         "a late, uneven link that loses packets",
-        99.3,
+        99.2,
         {"reference": "mapped", "disturbances": "teleop:latency:train", "success_error": 0.033},
     ),
     Member(
