@@ -34,7 +34,9 @@ MARKER = "<!-- numbers: docs/results/environment.json -->"
 BARS: dict[str, Any] = {
     "single": {"240 Hz, 8 substeps": 0.95, "60 Hz, 2 substeps": 0.85},
     "sixteen": {"240 Hz, 8 substeps": 0.90, "60 Hz, 2 substeps": 0.90},
+    "whole_body_240_hz": 1.8,
     "servo_1024_times_raw": 400,
+    "disturbed": 3,
     "reset_ms": 0.1,
     "frame_ms": 5,
     "memory_mb": 60,
@@ -377,7 +379,7 @@ def table(result: dict[str, Any]) -> str:
             (f"16 robots, {label}: share of raw physics", f"{result['sixteen'][label]['share_of_raw']:.3f}", many)
         )
     for label, values in result["whole_body"].items():
-        bar = "1.8" if label.startswith("240") else ""
+        bar = f"{BARS['whole_body_240_hz']}" if label.startswith("240") else ""
         rows.append((f"{label}: times faster than with the whole body", f"{values['times_faster']:.2f}", bar))
         rows.append((f"{label}: arms apart from those of the whole body [rad]", f"{values['apart_rad']:.5f}", ""))
     for count, ratio in sorted(result["servo_times_raw"].items(), key=lambda row: int(row[0])):
@@ -385,7 +387,8 @@ def table(result: dict[str, Any]) -> str:
         rows.append((f"servo model, {count} robots: times raw physics at 240 Hz", f"{ratio:.0f}", bar))
     for label, name in (("whole clips", "whole_clips"), ("uniform starts", "uniform_starts")):
         ratio = f"{result['disturbed'][name]:.1f}"
-        rows.append((f"servo model, 64 robots, {label}: cost of a step with disturbances, without is 1", ratio, "3"))
+        what = f"servo model, 64 robots, {label}: cost of a step with disturbances, without is 1"
+        rows.append((what, ratio, f"{BARS['disturbed']}"))
     for label, values in result["workers"].items():
         what = f"{label.replace(' ', ' robots, ')}, workers={values['workers']}: times faster than in one process"
         rows.append((what, f"{values['times_faster']:.2f}", ""))
@@ -415,9 +418,8 @@ def _missed(what: str, measured: float, bar: float) -> bool:
 
 
 def write_page(page: Path, content: str) -> None:
-    """Puts table and verdict where the page has those of the run before, and drops the note on an older release."""
+    """Puts table and verdict where the page has those of the run before."""
     text = page.read_text(encoding="utf-8")
-    text = re.sub(r"\*Measured with the first release[^\n]*\n\n", "", text)
     pattern = re.escape(MARKER) + r"\n\n(?:\|[^\n]*\n)+\n[^\n]*\n"
     text, count = re.subn(pattern, lambda _: f"{MARKER}\n\n{content}\n", text)
     if count != 1:
