@@ -1,11 +1,11 @@
 """Asks peers what they ask of us, in one process on one machine, and writes ``docs/results/peers.json``.
 
-    python scripts/check_peers.py [--gmr CHECKOUT --bvh FILE.bvh]
+    python scripts/check_peers.py [--gmr CHECKOUT --bvh FILE.bvh ...]
 
 Environments: what Gymnasium's ``check_env`` says of ours, of panda-gym's (`pip install --no-deps panda-gym==3.0.7`) and
 of Humanoid-v5 (extra `mjcf`), and processor time of a step. Motions: the same frames, the same limbs, the same robot by
 the unfitted mapping and by mink (extra `ik`); with ``--gmr`` the Unitree G1 by the method of a checkout of GMR
-(``general_motion_retargeting``, with what it needs installed) and by the unfitted mapping, on a BVH file of LAFAN1's
+(``general_motion_retargeting``, with what it needs installed) and by the unfitted mapping, on BVH files of CMU's
 skeleton. What is not installed or not named is not run, and what was not run is not printed.
 """
 
@@ -14,9 +14,11 @@ from __future__ import annotations
 import argparse
 import importlib.metadata as metadata
 import importlib.util
+import sys
 import time
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +26,33 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 import syda_gym
 from syda_gym.files import write_json
+from syda_gym.motions.readers.bvh.hierarchy import read_hierarchy
+from syda_gym.motions.readers.bvh.kinematics import joint_positions
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "results" / "peers.json"
 ACTIONS = ("wave_high", "drum", "reach_high_front", "clap")
 STEPS = 300
+GMR_FPS = 30.0  # to which GMR brings motions of SMPL-X
+CMU = {  # GMR's joints of SMPL-X, and CMU's at the same places
+    "pelvis": "Hips",
+    "spine3": "Spine1",
+    **{
+        f"{side}_{theirs}": f"{side.title()}{name}"
+        for side in ("left", "right")
+        for theirs, name in {
+            "hip": "UpLeg",
+            "knee": "Leg",
+            "foot": "ToeBase",
+            "shoulder": "Arm",
+            "elbow": "ForeArm",
+            "wrist": "Hand",
+        }.items()
+    },
+}
 Frames = NDArray[np.float64]
 
 
@@ -38,7 +60,7 @@ def main() -> None:
     """Runs what is there and keeps what was found."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--gmr", type=Path, help="checkout of GMR")
-    parser.add_argument("--bvh", type=Path, help="motion capture with LAFAN1's skeleton, for --gmr")
+    parser.add_argument("--bvh", type=Path, nargs="+", help="for --gmr: CMU's skeleton, a T-pose in the first frame")
     parser.add_argument("--out", type=Path, default=PAGE)
     given = parser.parse_args()
     warnings.simplefilter("ignore")
@@ -46,7 +68,8 @@ def main() -> None:
     if given.gmr is not None:
         if given.bvh is None:
             parser.error("--gmr needs --bvh FILE.bvh: GMR wants a whole skeleton with orientations")
-        result["on the Unitree G1"] = on_unitree(given.gmr, given.bvh)
+        for file in given.bvh:
+            result[f"on the Unitree G1, {file.stem}"] = on_unitree(given.gmr, file)
     names = ("syda-gym", "gymnasium", "panda-gym", "mujoco", "mink", "pybullet")
     result["versions"] = {name: version for name in names if (version := installed(name))}
     write_json(given.out, result)
@@ -180,60 +203,93 @@ def figures(
 
 def on_unitree(checkout: Path, bvh: Path) -> dict[str, Any]:
     """The arms of the Unitree G1: GMR's whole-body method, and the unfitted mapping on the same frames."""
-    import sys
-
     sys.path.insert(0, str(checkout.resolve()))
     from general_motion_retargeting import GeneralMotionRetargeting, params  # type: ignore[import-not-found]
-    from general_motion_retargeting.utils.lafan1 import load_bvh_file  # type: ignore[import-not-found]
 
-    people, height = load_bvh_file(str(bvh))
-    names = [["LeftArm", "LeftForeArm", "LeftHand"], ["RightArm", "RightForeArm", "RightHand"]]
-    person = np.array([[[frame[joint][0] for joint in arm] for arm in names] for frame in people], dtype=np.float64)
-    retarget = GeneralMotionRetargeting("bvh_lafan1", "unitree_g1", actual_human_height=height, verbose=False)
-    model = retarget.model
+    clip = syda_gym.load_motions(f"bvh:{bvh}").clips("operator")[0]
+    clip = replace(clip, frames=clip.frames[:: round(clip.fps / GMR_FPS)], fps=GMR_FPS)
+    mapping: Any = syda_gym.unfitted(clip.body, str(params.ROBOT_XML_DICT["unitree_g1"]))
+    ours = followed(mapping, [clip], lambda each: mapping.sequence(each.frames, each.fps))
+
+    people, height = smpl_like(bvh, float(mapping.source.arm_lengths[0].sum()), len(clip))
+    retarget = GeneralMotionRetargeting("smplx", "unitree_g1", actual_human_height=height, verbose=False)
+    for _ in range(10):
+        retarget.retarget(dict(people[0]))  # it begins settled
     kept: list[Any] = []
     seconds = spent(lambda: kept.extend(retarget.retarget(dict(frame)) for frame in people))
-    poses, points = np.array(kept), robot_points(model, np.array(kept))
-    joints = [
-        j for j in range(model.njnt) if any(part in model.joint(j).name for part in ("shoulder", "elbow", "wrist"))
-    ]
-    columns = [int(model.jnt_qposadr[j]) for j in joints]
-    # Both are compared in the trunk's own axes: GMR turns the whole robot with the person.
-    gmr = figures(in_trunk(person), in_trunk(points), poses[:, columns], seconds, np.array([], dtype=np.int64))
-    rows: dict[str, Any] = {"GMR, whole body": gmr}
-    motions = syda_gym.load_motions(f"bvh:{bvh}")
-    clip = motions.clips("operator")[0]
-    mapping: Any = syda_gym.unfitted(clip.body, str(params.ROBOT_XML_DICT["unitree_g1"]))
-    rows["unfitted, arms"] = followed(mapping, [clip], lambda each: mapping.sequence(each.frames, each.fps))
-    return rows
+    poses, model, none = np.array(kept), retarget.model, np.array([], dtype=np.int64)
+    angles = poses[:, [int(model.joint(name).qposadr[0]) for name in mapping.target.joint_names]]
+    sides = ("left", "right")
+    person = np.array(
+        [
+            [[frame[f"{side}_{part}"][0] for part in ("shoulder", "elbow", "wrist")] for side in sides]
+            for frame in people
+        ]
+    )
+    torso = Rotation.from_matrix(of_bodies(model, poses, ["torso_link"], "xmat").reshape(-1, 3, 3))
+    same = np.einsum("nij,napj->napi", torso.as_matrix(), mapping.target.arm_points(angles))
+    links = [f"{side}_{part}_link" for side in sides for part in ("shoulder_yaw", "elbow", "wrist_yaw")]
+    own = of_bodies(model, poses, links, "xpos").reshape(-1, 2, 3, 3)
+    return {
+        "GMR, whole body": figures(person, same, angles, seconds, none),
+        "GMR, between its links' frames": figures(person, own, angles, seconds, none),
+        "unfitted, arms": ours,
+    }
 
 
-def robot_points(model: Any, poses: Frames) -> Frames:
-    """Shoulder, elbow and wrist of the G1 ``(N, 2, 3, 3)`` [m], by MuJoCo."""
+def of_bodies(model: Any, poses: Frames, names: list[str], what: str) -> Frames:
+    """A quantity of bodies ``(N, bodies, ...)`` in the world, by MuJoCo."""
     import mujoco
 
     data, result = mujoco.MjData(model), []
     for pose in poses:
         data.qpos[:] = pose
         mujoco.mj_kinematics(model, data)
-        result.append(
-            [
-                [data.body(f"{side}_{part}_link").xpos.copy() for part in ("shoulder_yaw", "elbow", "wrist_yaw")]
-                for side in ("left", "right")
-            ]
-        )
+        result.append([getattr(data.body(name), what).copy() for name in names])
     return np.array(result)
 
 
-def in_trunk(points: Frames) -> Frames:
-    """Points in axes of their own shoulders: y from right to left, z up, so that headings do not count."""
-    across = points[:, 0, 0] - points[:, 1, 0]
-    across = across * np.array([1.0, 1.0, 0.0])
-    y = across / np.linalg.norm(across, axis=-1, keepdims=True)
-    z = np.broadcast_to(np.array([0.0, 0.0, 1.0]), y.shape)
-    axes = np.stack([np.cross(y, z), y, z], axis=1)
-    result: Frames = np.einsum("nij,napj->napi", axes, points)
-    return result
+def smpl_like(bvh: Path, arm: float, count: int) -> tuple[list[dict[str, tuple[Frames, Frames]]], float]:
+    """What GMR takes of SMPL-X, of a BVH file of CMU's skeleton whose first frame is a T-pose.
+
+    SMPL-X turns every joint from a T-pose in which all axes are the world's; so does what is left of a joint's turn
+    when that of the T-pose is taken out. y is up in the file and z in GMR.
+
+    Args:
+        bvh: the file.
+        arm: length of its left arm [m], by which units become metres.
+        count: of frames that are wanted at `GMR_FPS`, after the first.
+
+    Returns:
+        Per frame and joint the place [m] and the quaternion (w first), and the person's height [m].
+    """
+    text = read_hierarchy(bvh, bvh.read_text().splitlines())
+    index = {joint.name: number for number, joint in enumerate(text.joints)}
+    if missing := sorted(set(CMU.values()) - set(index)):
+        raise SystemExit(f"{bvh}: --gmr takes CMU's skeleton; it has no {', '.join(missing)}")
+    turns: list[Rotation] = []
+    for joint in text.joints:
+        turn = turns[joint.parent] if joint.parent >= 0 else Rotation.identity()
+        for column, (axis, is_turn) in enumerate(joint.channels, start=joint.first):
+            if is_turn:
+                turn = turn * Rotation.from_rotvec(np.deg2rad(text.values[:, [column]]) * np.eye(3)[axis])
+        turns.append(turn)
+    places = joint_positions(text, range(len(text.joints)))
+    rest = {name: places[number][0] for name, number in index.items()}
+    across = rest["LeftHand"] - rest["RightHand"]
+    if across[0] < 0.9 * float(np.linalg.norm(across)):
+        raise SystemExit(f"{bvh}: --gmr takes files whose first frame is a T-pose that looks along +z, y up")
+    lengths = [np.linalg.norm(rest[b] - rest[a]) for a, b in (("LeftArm", "LeftForeArm"), ("LeftForeArm", "LeftHand"))]
+    metres = arm / float(sum(lengths))
+    rows = 1 + round(1.0 / (text.frame_time * GMR_FPS)) * np.arange(count)
+    up = Rotation.from_euler("x", 90.0, degrees=True)
+    found = {}
+    for theirs, name in CMU.items():
+        turn = up * turns[index[name]][rows] * turns[index[name]][0].inv()
+        found[theirs] = (metres * up.apply(places[index[name]][rows]), turn.as_quat(scalar_first=True))
+    tall = metres * float(max(p[1] for p in rest.values()) - min(p[1] for p in rest.values()))
+    # The last joint is where the head begins: an eighth of a person is above it.
+    return [{name: (p[n], q[n]) for name, (p, q) in found.items()} for n in range(count)], 8.0 / 7.0 * tall
 
 
 if __name__ == "__main__":

@@ -107,7 +107,8 @@ def _follow(driver: Driver, frames: Anticipation, ending: Ending, seconds: float
 def _go_to_rest(driver: Driver, ending: Ending) -> None:
     """Asks for rest and keeps deciding until the robot is there; frames are left unread, requests are not."""
     begun, signals = driver.source.clock(), ending.asked
-    controls: tuple[str, ...] = ("resume", "rest")
+    # The last command may just have left: one at once would be a step too short to go any way.
+    controls = ("resume", "rest", *_homeward(_listen(driver, ending, signals, max(driver.early, 0.0))))
     while driver.source.clock() - begun < _HOMEWARD and not driver.gone:
         state = driver.step(Received(None, 0.0, controls)).state
         if state is State.RESTING:
@@ -115,9 +116,12 @@ def _go_to_rest(driver: Driver, ending: Ending) -> None:
         if state is State.STOPPED:
             _repeat(driver)
             return
-        heard = _listen(driver, ending, signals, 1.0 / driver.loop.settings.rate)
-        # Whoever resumes on the way home goes on home.
-        controls = tuple(c for control in heard for c in (("resume", "rest") if control == "resume" else (control,)))
+        controls = _homeward(_listen(driver, ending, signals, 1.0 / driver.loop.settings.rate))
+
+
+def _homeward(heard: list[str]) -> tuple[str, ...]:
+    """Requests on the way home: whoever resumes goes on home."""
+    return tuple(c for control in heard for c in (("resume", "rest") if control == "resume" else (control,)))
 
 
 def _listen(driver: Driver, ending: Ending, signals: int, seconds: float) -> list[str]:

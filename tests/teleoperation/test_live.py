@@ -26,6 +26,7 @@ from syda_gym.teleoperation.live_run import run
 from syda_gym.teleoperation.live_statistics import LiveStatistics
 from syda_gym.teleoperation.loop import TeleoperationLoop
 from syda_gym.teleoperation.outgoing.sinks import ManySinks, MemorySink, UdpSink
+from syda_gym.teleoperation.safety.punctuality import SPACING
 from syda_gym.teleoperation.tick import Decision, LoopSettings, State
 from tests.teleoperation.conftest import LimbMapping
 
@@ -93,9 +94,13 @@ def test_a_recording_drives_the_robot_at_its_own_speed(
         stats = run(source, loop, sink, journal=journal)
     assert source.seconds == pytest.approx(2.0)
     assert sink.decisions[-1].now - sink.decisions[0].now > 1.99
-    assert stats.frames == 62, "of standing and waving, none is lost"
-    assert stats.states["following"] >= 30
+    late = source.inbox.dropped["overtaken"]  # by the next, where other work shares the machine
+    assert stats.frames + late == 62, "of standing and waving, none is lost"
+    assert late < 20
+    assert stats.states["following"] >= 30 - late
     assert sink.decisions[-1].state is State.RESTING, "at the end it goes home"
+    apart = np.diff([decision.now for decision in sink.decisions])
+    assert apart.min() > 0.99 * SPACING / loop.settings.rate, "at the turn for home too: a hasty step makes it creep"
     check(sink, pepper)
     assert replay_journal(tmp_path / "run.jsonl", mapping).exact
 

@@ -125,8 +125,8 @@ class Motion:
 
     def freeze(self) -> None:
         """Stands still at once, whatever the acceleration: an emergency stop."""
-        self._pace.rest()
         self._pace.end(self._now, np.zeros(len(self.command)))
+        self._pace.rest()
         self._forget()
 
     def brake(self) -> None:

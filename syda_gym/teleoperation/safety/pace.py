@@ -144,10 +144,15 @@ class Pace:
         self._step, self._planned = step, planned
 
     def rest(self) -> None:
-        """The robot has been stopped, or put somewhere: it does not move."""
+        """The robot has been stopped, or put somewhere: it does not move.
+
+        A stop does not wait for its turn. Counted as a step, one so short would make the robot slow for as long as late
+        commands are remembered.
+        """
         self.velocity = self._was = np.zeros_like(self.velocity)
         self.acceleration = np.zeros_like(self.velocity)
         self._step, self._planned = np.zeros_like(self.velocity), np.zeros_like(self.velocity)
+        self.dt = 0.0
 
     def twin(self) -> Pace:
         """A copy whose steps change nothing of this one."""

@@ -69,6 +69,23 @@ def test_one_hiccup_is_soon_forgiven_and_a_busy_machine_is_remembered() -> None:
     assert 35.0 < recovery([20.0 + 3.0 * index for index in range(20)]) < 41.0
 
 
+def test_an_emergency_stop_out_of_turn_makes_nobody_slow(pepper: Robot) -> None:
+    limiter = CommandLimiter(pepper)
+    motion = Motion(limiter, None, DT, limiter.speed / 0.2, None, pepper.rest)
+    goal, now, late, allowed = 0.5 * (pepper.lower + pepper.upper), 0.0, 0.0, list[float]()
+    for step in range(400):
+        hasty = step == 200
+        last, now = now, now + (0.001 if hasty else DT)
+        motion.begin(now, last + late + 0.0005, last + late)
+        late = 0.004 if step % 7 == 0 else 0.0
+        if hasty:
+            motion.freeze()
+        else:
+            motion.follow(goal if step % 60 < 30 else pepper.rest, 1.0)
+        allowed.append(motion._pace.punctuality.seconds)
+    assert min(allowed[210:]) > 0.5 * min(allowed[150:200]), "as late as before is as fast as before"
+
+
 def wire(robot: Robot, rng: np.random.Generator, rate: float, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times of arrival and poses of a loop that is late, stalls, and sends at any moment within its brackets."""
     limiter = CommandLimiter(robot)
