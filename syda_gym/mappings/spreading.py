@@ -29,6 +29,6 @@ def spread_out(rows: FloatArray, count: int) -> FloatArray:
     if len(rows) > _MOST:
         rows = rows[:: -(-len(rows) // _MOST)]
     first = int(np.argmin(np.sum((rows - rows.mean(axis=0)) ** 2, axis=1)))
-    own = np.ascontiguousarray(rows, dtype=np.float64)
-    chosen: FloatArray = rows[first_call(farthest, own, first, min(count, len(rows)), _SAME)]
+    columns = np.ascontiguousarray(rows.T, dtype=np.float64)
+    chosen: FloatArray = rows[first_call(farthest, columns, first, min(count, len(rows)), _SAME)]
     return chosen

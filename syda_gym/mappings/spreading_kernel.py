@@ -10,42 +10,53 @@ __all__ = ["farthest"]
 
 
 @compiled
-def _squared(rows, a, b):
-    """Squared distance of two rows; from eight numbers on in eight partial sums, as NumPy adds."""
-    width = rows.shape[1]
-    total = 0.0
+def _squared(columns, last, gap, parts):
+    """Squared distances of all rows to one, into ``gap``; from eight numbers on in eight partial sums, as NumPy adds.
+
+    Numbers of one column lie side by side, so that several rows are computed at once.
+    """
+    width, count = columns.shape
     start = 0
+    for row in range(count):
+        gap[row] = 0.0
     if width >= 8:
-        p = q = r = s = t = u = v = w = 0.0
         start = width - width % 8
-        for i in range(0, start, 8):
-            p += (rows[a, i] - rows[b, i]) ** 2
-            q += (rows[a, i + 1] - rows[b, i + 1]) ** 2
-            r += (rows[a, i + 2] - rows[b, i + 2]) ** 2
-            s += (rows[a, i + 3] - rows[b, i + 3]) ** 2
-            t += (rows[a, i + 4] - rows[b, i + 4]) ** 2
-            u += (rows[a, i + 5] - rows[b, i + 5]) ** 2
-            v += (rows[a, i + 6] - rows[b, i + 6]) ** 2
-            w += (rows[a, i + 7] - rows[b, i + 7]) ** 2
-        total = ((p + q) + (r + s)) + ((t + u) + (v + w))
+        for part in range(8):
+            one, sums, at = columns[part], parts[part], columns[part, last]
+            for row in range(count):
+                sums[row] = (one[row] - at) ** 2
+        for i in range(8, start):
+            one, sums, at = columns[i], parts[i % 8], columns[i, last]
+            for row in range(count):
+                sums[row] += (one[row] - at) ** 2
+        p, q, r, s = parts[0], parts[1], parts[2], parts[3]
+        t, u, v, w = parts[4], parts[5], parts[6], parts[7]
+        for row in range(count):
+            gap[row] = ((p[row] + q[row]) + (r[row] + s[row])) + ((t[row] + u[row]) + (v[row] + w[row]))
     for i in range(start, width):
-        total += (rows[a, i] - rows[b, i]) ** 2
-    return total
+        one, at = columns[i], columns[i, last]
+        for row in range(count):
+            gap[row] += (one[row] - at) ** 2
 
 
 @compiled
-def farthest(rows, first, count, same):
-    """Indices of ``count`` rows, ``first`` before all; fewer where the rest lie within ``same`` of one of them."""
+def farthest(columns, first, count, same):
+    """Indices of ``count`` rows, ``first`` before all; fewer where the rest lie within ``same`` of one of them.
+
+    ``columns`` ``(D, N)`` is contiguous.
+    """
+    rows = columns.shape[1]
     chosen = np.empty(count, dtype=np.int64)
     chosen[0] = first
-    distance = np.full(len(rows), np.inf)
+    distance = np.full(rows, np.inf)
+    gap, parts = np.empty(rows), np.empty((8, rows))
     found = 1
     while True:
-        last, best, far = chosen[found - 1], 0, -1.0
-        for row in range(len(rows)):
-            gap = _squared(rows, row, last)
-            if gap < distance[row]:
-                distance[row] = gap
+        _squared(columns, chosen[found - 1], gap, parts)
+        for row in range(rows):
+            distance[row] = min(distance[row], gap[row])
+        best, far = 0, -1.0
+        for row in range(rows):
             if distance[row] > far:
                 best, far = row, distance[row]
         if found == count or far <= same:

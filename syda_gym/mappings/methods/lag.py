@@ -34,13 +34,16 @@ def estimate_lags(pair: PairedMotions, source: FloatArray, target: FloatArray, l
     if limit == 0 or len(pair.action_names) < _LEAST_ACTIONS:
         return lags
     codes = Scaler.fit(_flat(source))(source)
-    clips = pair.clip_rows()
+    shifts = np.array(sorted(range(-limit, limit + 1), key=abs))
+    clips: dict[str, list[Rows]] = {}
+    for rows in pair.clip_rows():
+        clips.setdefault(str(pair.recordings[rows[0]]), []).append(rows)
     for action in pair.action_names:
         others = pair.actions != action
-        predicted = Ridge.fit(_flat(codes[others]), _flat(target[others]), _SHRINKAGE)(codes)
-        for name in np.unique(pair.recordings[~others]):
-            rows = [clip for clip in clips if pair.recordings[clip[0]] == name]
-            lags[str(name)] = _best(rows, predicted, target, limit)
+        ridge = Ridge.fit(_flat(codes[others]), _flat(target[others]), _SHRINKAGE)
+        for name in np.unique(pair.recordings[~others]).tolist():
+            costs = sum(_costs(ridge(codes[rows]), target[rows], shifts) for rows in clips[name])
+            lags[name] = int(shifts[np.argmin(costs)])  # the smaller one when two are equal
     return lags
 
 
@@ -50,21 +53,19 @@ def shift_targets(pair: PairedMotions, target: FloatArray, lags: dict[str, int])
     for rows in pair.clip_rows():
         lag = lags[str(pair.recordings[rows[0]])]
         if lag:
-            result[rows] = target[_shifted(rows, lag)]
+            result[rows] = target[rows[_shifted(len(rows), lag)]]
     return result
 
 
-def _best(clips: list[Rows], predicted: FloatArray, target: FloatArray, limit: int) -> int:
-    """The shift of least squared error; the smaller one when two are equal."""
-    shifts = sorted(range(-limit, limit + 1), key=abs)
-    costs = [
-        sum(float(np.sum((predicted[rows] - target[_shifted(rows, shift)]) ** 2)) for rows in clips) for shift in shifts
-    ]
-    return shifts[int(np.argmin(costs))]
+def _costs(predicted: FloatArray, target: FloatArray, shifts: NDArray[np.int64]) -> FloatArray:
+    """Squared error of a clip ``(N, K, E)`` for each shift of its targets."""
+    result: FloatArray = np.sum((predicted - target[_shifted(len(target), shifts[:, None])]) ** 2, axis=(1, 2, 3))
+    return result
 
 
-def _shifted(rows: Rows, lag: int) -> Rows:
-    shifted: Rows = rows[np.clip(np.arange(len(rows)) + lag, 0, len(rows) - 1)]
+def _shifted(count: int, lag: int | NDArray[np.int64]) -> Rows:
+    """Rows of a clip, moved; ends are held."""
+    shifted: Rows = np.clip(np.arange(count) + lag, 0, count - 1)
     return shifted
 
 
