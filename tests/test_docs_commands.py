@@ -52,6 +52,7 @@ SHORTER = {
     "syda-gym evaluate": "--clips 1 --physics servo",
     "syda-gym teleop --check-journal": "",
     "syda-gym teleop": "--seconds 1",
+    "syda-gym export": "--agent-only",  # the mapping as a graph: tests/agents/test_work.py
 }
 # Names that the pages leave to the reader.
 REPLACED = {"left_hand": "l_wrist", "right_hand": "r_wrist"}

@@ -14,7 +14,7 @@ import pytest
 FOLDER = Path(__file__).resolve().parents[1] / "examples"
 # Script -> arguments that keep it short, and a piece of what it prints.
 RUNS: dict[str, tuple[list[str], str]] = {
-    "01_camera_to_pepper.py": (["4"], "film: camera_to_pepper.mp4"),
+    "01_camera_to_pepper.py": (["3"], "film: camera_to_pepper.mp4"),
     "02_your_film.py": ([], "film: your_film.mp4"),
     "03_your_robot.py": ([], "film: your_robot.mp4"),
     "04_record_and_fit.py": ([], "error on unseen ones"),

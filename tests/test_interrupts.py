@@ -85,7 +85,11 @@ BOTH = pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM], ids=["SIG
 @BOTH
 def test_benchmark(motions, tmp_path, how):
     config, out = tmp_path / "config.yaml", tmp_path / "out"
-    config.write_text("{routes: ['adult>pepper', 'kid>pepper'], methods: [ridge, syda, direct], folds: 3}")
+    # One cell that is soon done, and others that take their time.
+    config.write_text(
+        "{routes: ['adult>pepper', 'kid>pepper', 'adult>kid'], methods: [ridge, 'syda:synergies', direct], folds: 3,"
+        "physics: servo, fit: {ridge: {confidence: false}}}"
+    )
     arguments = ["benchmark", str(config), "--motions", motions, "--out", str(out), "--workers", "2"]
     code, said = stopped(arguments, lambda _: bool(list(out.glob("cells/*.json"))), how)
     check(code, said, how, "the same command goes on from there")
@@ -107,7 +111,7 @@ def test_reproduce_paper(motions, tmp_path, how):
 @BOTH
 def test_train_stopped_in_its_first_leg_leaves_a_checkpoint(motions, tmp_path, how):
     out = tmp_path / "out"
-    arguments = ["train", "--motions", motions, "--out", str(out), "--steps", "50000000"]
+    arguments = ["train", "--motions", motions, "--out", str(out), "--base", "lead", "--steps", "50000000"]
     code, said = stopped(arguments, lambda _: (out / "checkpoint.safetensors").is_file(), how)
     check(code, said, how, "stands at 0 steps; the same command with --resume goes on from there")
     assert not list(out.glob(".*"))

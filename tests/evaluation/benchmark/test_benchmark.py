@@ -25,6 +25,7 @@ from syda_gym.evaluation.benchmark.work import Worker, folds_of
 from syda_gym.evaluation.chains import Links, all_routes, check_route
 from syda_gym.evaluation.pools import InlinePool, Schedule
 from syda_gym.mappings.fitting.fit import METHODS, fit
+from syda_gym.motions import load_motions, save_motions
 
 QUICK = {
     "routes": ["adult>pepper", "adult>kid>pepper", "adult>kid"],
@@ -285,24 +286,27 @@ def test_another_bundle_under_the_same_name_makes_other_cells(small_motions, tmp
 RUN = """
 import sys
 from syda_gym.evaluation.benchmark import BenchmarkConfig, run_benchmark
+from syda_gym.motions import load_motions
 if __name__ == "__main__":
-    run_benchmark(BenchmarkConfig.read(sys.argv[1]), sys.argv[2], workers=2)
+    run_benchmark(BenchmarkConfig.read(sys.argv[1]), sys.argv[2], workers=2, motions=load_motions(sys.argv[3]))
 """
 
 
-def test_a_killed_run_goes_on_to_the_same_bytes_and_leaves_no_process_behind(tmp_path, in_process):
+def test_a_killed_run_goes_on_to_the_same_bytes_and_leaves_no_process_behind(tmp_path, in_process, small_motions):
     """The cheap version of ``scripts/check_benchmark.py kills``."""
     settings = {
         "routes": ["adult>pepper", "adult>kid"],
         "methods": ["ridge", "geometric"],
         "folds": 2,
-        "fps": 3,
         "physics": "servo",
         "fit": {"ridge": {"confidence": False}, "geometric": {"confidence": False}},
     }
     (tmp_path / "config.yaml").write_text(json.dumps(settings))
+    save_motions(small_motions, tmp_path / "small.npz")
+    motions = load_motions(f"npz:{tmp_path / 'small.npz'}")
     folder = tmp_path / "killed"
-    process = subprocess.Popen([sys.executable, "-c", RUN, str(tmp_path / "config.yaml"), str(folder)])
+    arguments = [str(tmp_path / "config.yaml"), str(folder), f"npz:{tmp_path / 'small.npz'}"]
+    process = subprocess.Popen([sys.executable, "-c", RUN, *arguments])
     deadline = time.monotonic() + 300.0  # a busy machine imports slowly
     try:
         while not list(folder.glob(f"cells/{16 * '?'}.json")) and process.poll() is None:
@@ -315,9 +319,9 @@ def test_a_killed_run_goes_on_to_the_same_bytes_and_leaves_no_process_behind(tmp
     while any(map(is_running, workers)):
         assert time.monotonic() < deadline, "the killed run left processes behind"
         time.sleep(0.05)
-    run_benchmark(BenchmarkConfig.of(settings), folder)
+    run_benchmark(BenchmarkConfig.of(settings), folder, motions=motions)
     assert sum(pool.computed for pool in in_process) < 4  # the first cell was not computed again
-    run_benchmark(BenchmarkConfig.of(settings), tmp_path / "whole")
+    run_benchmark(BenchmarkConfig.of(settings), tmp_path / "whole", motions=motions)
     for name in ("results.csv", "benchmark.json"):
         assert (folder / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
