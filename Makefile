@@ -7,14 +7,17 @@ OUT ?= demo-output
 
 export OMP_NUM_THREADS ?= 1
 export MPLBACKEND ?= Agg
+# Modules are compiled once, and not in each of the hundreds of processes that tests start.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test coverage lowest lint types check docs wheel clean
 
 demo: $(BASE)
 	$(BIN)/syda-gym demo --out $(OUT)
 
+# Three at a time on two cores: tests wait for browsers, signals and robots that ease home.
 test: $(DEVELOPMENT)
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 3 --dist loadfile
 
 # Lines and branches of the package that the tests reach, as a table and as coverage/index.html.
 coverage: $(DEVELOPMENT)

@@ -34,7 +34,7 @@ def told(done: int, count: int, name: str) -> None:
 
 
 if __name__ == "__main__":  # processes import this file
-    shipped = load_motions("embedded", fps=10)
+    shipped = load_motions("embedded", fps=5)
     takes = tuple(take for take in shipped.takes if take.action in ("wave_high", "drum", "clap", "reach_high_front"))
     motions = Motions("four actions", takes, shipped.bodies, shipped.families, synthetic=True)
     results = run_benchmark(config, "benchmark_on_ray", workers=workers, motions=motions, progress=told)

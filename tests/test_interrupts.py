@@ -87,8 +87,8 @@ def test_benchmark(motions, tmp_path, how):
     config, out = tmp_path / "config.yaml", tmp_path / "out"
     # One cell that is soon done, and others that take their time.
     config.write_text(
-        "{routes: ['adult>pepper', 'kid>pepper', 'adult>kid'], methods: [ridge, 'syda:synergies', direct], folds: 3,"
-        "physics: servo, fit: {ridge: {confidence: false}}}"
+        "{routes: ['adult>pepper', 'kid>pepper', 'adult>kid'], methods: [geometric, direct], folds: 3,"
+        "physics: servo, fit: {geometric: {confidence: false}}}"
     )
     arguments = ["benchmark", str(config), "--motions", motions, "--out", str(out), "--workers", "2"]
     code, said = stopped(arguments, lambda _: bool(list(out.glob("cells/*.json"))), how)
