@@ -10,18 +10,20 @@ export MPLBACKEND ?= Agg
 # Modules are compiled once, and not in each of the hundreds of processes that tests start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test coverage lowest lint types check docs wheel clean
+.PHONY: demo test coverage lowest pythons on-python lint types check docs wheel clean
 
 demo: $(BASE)
 	$(BIN)/syda-gym demo --out $(OUT)
 
 # Three at a time on two cores: tests wait for browsers, signals and robots that ease home.
 test: $(DEVELOPMENT)
-	$(BIN)/python -m pytest -n 3 --dist loadfile
+	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
 
 # Lines and branches of the package that the tests reach, as a table and as coverage/index.html.
 coverage: $(DEVELOPMENT)
 	$(BIN)/python -m pytest -n 2 --dist loadfile --cov --cov-report=term-missing:skip-covered --cov-report=html:coverage
+
+ROOMS := tests/embodiments tests/motions tests/mappings tests/simulation tests/envs tests/teleoperation tests/agents tests/cli
 
 # The tests of most rooms with the lowest versions that pyproject.toml allows.
 LOWEST := .venv/lowest
@@ -30,8 +32,20 @@ lowest: $(BASE)
 	$(LOWEST)/bin/python -m pip install --quiet uv "torch==2.13.0"
 	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct \
 		-e ".[dev,train,ik,live,camera,view,export]"
-	$(LOWEST)/bin/python -m pytest -p no:cacheprovider tests/embodiments tests/motions tests/mappings tests/simulation \
-		tests/envs tests/teleoperation tests/agents tests/cli
+	$(LOWEST)/bin/python -m pytest -p no:cacheprovider $(ROOMS)
+
+# The same tests with the other versions of Python that this machine has.
+pythons:
+	@for python in python3.12 python3.13; do \
+		if command -v $$python > /dev/null; then $(MAKE) --no-print-directory on-python PYTHON=$$python || exit 1; \
+		else echo "no $$python on this machine: not tested with it"; fi; \
+	done
+
+on-python:
+	$(PYTHON) -m venv --clear .venv/$(notdir $(PYTHON))
+	.venv/$(notdir $(PYTHON))/bin/python -m pip install --quiet "torch==2.13.0"
+	.venv/$(notdir $(PYTHON))/bin/python -m pip install --quiet -e ".[dev,train,ik,live,camera,view,export]"
+	.venv/$(notdir $(PYTHON))/bin/python -m pytest -n 2 --dist loadfile -p no:cacheprovider $(ROOMS)
 
 lint: $(DEVELOPMENT)
 	$(BIN)/ruff check .

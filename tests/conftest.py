@@ -21,6 +21,34 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 DRIVER = shutil.which("chromedriver")
 
 
+# Files that take longest, the longest first: begun last, one of them would keep a single process busy at the end.
+LONGEST = (
+    "tests/test_docs.py",
+    "tests/test_examples.py",
+    "tests/evaluation/benchmark/test_benchmark.py",
+    "tests/evaluation/report/test_report.py",
+    "tests/test_docs_commands.py",
+    "tests/agents/test_work.py",
+    "tests/envs/parallel/test_parallel.py",
+    "tests/test_interrupts.py",
+    "tests/evaluation/paper/test_paper.py",
+    "tests/test_packaging.py",
+    "tests/teleoperation/test_session.py",
+    "tests/agents/graphs/test_graphs.py",
+    "tests/evaluation/test_episodes.py",
+    "tests/files/test_hostile_files.py",
+    "tests/teleoperation/bags/test_mcap_journal.py",
+    "tests/teleoperation/test_failures.py",
+    "tests/envs/test_teleop.py",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest files first, the others as they were found."""
+    rank = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.nodeid.split("::")[0], len(rank)))
+
+
 @pytest.fixture(autouse=True)
 def catalog_forgets() -> Iterator[None]:
     """Bodies that a test adds to the catalog are gone after it, whichever test comes next in this process."""

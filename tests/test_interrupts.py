@@ -90,7 +90,7 @@ def test_benchmark(motions, tmp_path, how):
         "{routes: ['adult>pepper', 'kid>pepper', 'adult>kid'], methods: [geometric, direct], folds: 3,"
         "physics: servo, fit: {geometric: {confidence: false}}}"
     )
-    arguments = ["benchmark", str(config), "--motions", motions, "--out", str(out), "--workers", "2"]
+    arguments = ["benchmark", str(config), "--motions", motions, "--out", str(out), "--workers", "1"]
     code, said = stopped(arguments, lambda _: bool(list(out.glob("cells/*.json"))), how)
     check(code, said, how, "the same command goes on from there")
     assert not list(out.rglob(".*"))  # no lock and nothing half-written
