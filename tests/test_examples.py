@@ -22,9 +22,9 @@ RUNS: dict[str, tuple[list[str], str]] = {
     "06_make_and_step.py": ([], "film: make_and_step.mp4"),
     "07_train_a_residual.py": (["6144"], "residual on unseen actions"),
     "08_sb3_from_scratch.py": (["1024"], "after 1024 steps"),
-    "09_benchmark_on_ray.py": (["2"], "page: benchmark_on_ray"),
+    "09_benchmark_on_ray.py": (["1"], "page: benchmark_on_ray"),
     "10_export_to_lerobot.py": (["episodes", "2"], "film: episodes"),
-    "cleanrl_style_ppo.py": (["30720"], "return at the beginning"),
+    "cleanrl_style_ppo.py": (["10240"], "return at the beginning"),
     "torchrl_ppo.py": (["2048"], "trained on 2048 steps"),
     "live_udp.py": (["4"], "median latency"),
 }

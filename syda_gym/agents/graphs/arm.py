@@ -42,6 +42,12 @@ class ArmKinematics(nn.Module):
         """Points ``(B, 3, 3)`` [m] in the torso frame for angles ``(B, n)`` [rad]."""
         return self._walk(angles)[0]
 
+    def directions(self, angles: Tensor) -> Tensor:
+        """Unit upper arm and forearm ``(B, 6)``."""
+        points = self.forward(angles)
+        along = points[:, 1:] - points[:, :-1]
+        return (along / norm(along)).reshape(-1, 6)
+
     def limbs(self, angles: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """``kernel.look``: unit upper arm and forearm ``(B, 6)``, their derivatives, and turns about the arm's length.
 

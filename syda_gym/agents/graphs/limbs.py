@@ -87,12 +87,12 @@ class LimbGraph(nn.Module):
 
     def _crossing(self, start: Tensor, goal: Tensor, target: Tensor, staying: Tensor) -> Tensor:
         """``kernel._crossing``."""
-        way, total = goal - start, 0.0 * target[:, :1]
-        for stop in range(kernel.WAY):
-            pose = start + (stop + 1.0) / (kernel.WAY + 1.0) * way
-            bent = torch.where(self.bends, start, pose)
-            misses = [miss_of(self.kinematics.limbs(each)[0], target) for each in (pose, bent)]
-            total = total + (torch.minimum(*misses) - staying).clamp(min=0.0)
+        way = goal - start
+        poses = torch.cat([start + (stop + 1.0) / (kernel.WAY + 1.0) * way for stop in range(kernel.WAY)])
+        bent = torch.where(self.bends, start.repeat(kernel.WAY, 1), poses)
+        found = self.kinematics.directions(torch.cat([poses, bent]))
+        misses = miss_of(found, target.repeat(2 * kernel.WAY, 1)).reshape(2, kernel.WAY, -1, 1)
+        total = (torch.minimum(misses[0], misses[1]) - staying).clamp(min=0.0).sum(dim=0)
         longest = (way.abs() / self.speed).max(dim=1, keepdim=True)[0]
         return longest * total / kernel.WAY
 
@@ -104,7 +104,7 @@ class LimbGraph(nn.Module):
         lower, upper = ((limit + 0.0 * target[:, :1]).repeat(count, 1) for limit in (self.lower, self.upper))
         anchor = near.repeat(count, 1)
         starts = self.limits.project(torch.cat([*closed, *seeds]), lower, upper, self.rest + 0.0 * anchor)
-        misses = miss_of(self.kinematics.limbs(starts)[0], target.repeat(count, 1)).reshape(count, -1)
+        misses = miss_of(self.kinematics.directions(starts), target.repeat(count, 1)).reshape(count, -1)
         starts = starts.reshape(count, -1, self.joints)
         best, least, miss = starts[0], self._score(misses[0, :, None], starts[0], near), misses[0, :, None]
         for index in range(1, count):

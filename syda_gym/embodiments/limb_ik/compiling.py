@@ -34,7 +34,8 @@ def compiled(function: Function) -> Function:
     """
     try:
         made: Any = numba.njit(cache=True, error_model="numpy")(function)
-        keep = may_keep(made._cache.cache_path, inspect.getfile(function))
+        # With NUMBA_DISABLE_JIT, for a debugger, it is the function itself.
+        keep = made is not function and may_keep(made._cache.cache_path, inspect.getfile(function))
     except RuntimeError:  # no folder can be written
         keep = False
     result: Function = made if keep else numba.njit(error_model="numpy")(function)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import signal
 
+import numba
 import pytest
 
-from syda_gym.embodiments.limb_ik.compiling import first_call
+from syda_gym.embodiments.limb_ik.compiling import compiled, first_call
 
 
 class Slow:
@@ -36,3 +37,12 @@ def test_a_compiled_function_is_called_as_it_is() -> None:
     with pytest.raises(KeyboardInterrupt):
         first_call(function, 1)
     assert not function.done
+
+
+def test_without_compiling_for_a_debugger_a_function_stays_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", True)
+
+    def doubled(number: int) -> int:
+        return 2 * number
+
+    assert compiled(doubled) is doubled

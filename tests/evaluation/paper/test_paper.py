@@ -14,6 +14,7 @@ from syda_gym.evaluation.paper.few_shot import few_shot
 from syda_gym.evaluation.paper.report import PRINTED, overview, tables, write_study
 from syda_gym.evaluation.paper.results import Study
 from syda_gym.evaluation.paper.study import reproduce
+from syda_gym.evaluation.pools import InlinePool
 from syda_gym.mappings import METHODS
 from syda_gym.mappings.fitting.held_out import cross_validate
 from syda_gym.motions import load_motions, save_motions
@@ -112,6 +113,7 @@ def test_a_study_that_is_killed_and_continued_writes_the_same_tables(spec, tmp_p
     monkeypatch.setattr(
         "syda_gym.evaluation.paper.study.CONTENDERS", tuple(c for c in CONTENDERS if c.name == QUICK[0])
     )
+    monkeypatch.setattr("syda_gym.evaluation.paper.study.make_pool", lambda _, *opener: InlinePool(*opener))
     arguments = {"seeds": 1, "protocols": ["loao"], "workers": 1}
 
     def killed(_: float, name: str) -> None:
