@@ -34,18 +34,22 @@ lowest: $(BASE)
 		-e ".[dev,train,ik,live,camera,view,export]"
 	$(LOWEST)/bin/python -m pytest -p no:cacheprovider $(ROOMS)
 
-# The same tests with the other versions of Python that this machine has.
+# Other versions of Python that this machine has, pyenv's too: every file compiles with them.
+OTHER_PYTHONS = $(foreach version,3.12 3.13,$(firstword $(shell python$(version) -c "import sys; print(sys.executable)" 2> /dev/null) \
+	$(wildcard $(HOME)/.pyenv/versions/$(version).*/bin/python$(version))))
 pythons:
-	@for python in python3.12 python3.13; do \
-		if command -v $$python > /dev/null; then $(MAKE) --no-print-directory on-python PYTHON=$$python || exit 1; \
-		else echo "no $$python on this machine: not tested with it"; fi; \
+	@echo "other versions of Python on this machine: $(or $(strip $(OTHER_PYTHONS)),none)"
+	@for python in $(OTHER_PYTHONS); do \
+		$$python -W error -c "import pathlib; [compile(p.read_text(), str(p), 'exec') for r in ('syda_gym', 'scripts', 'examples', 'tests') \
+			for p in pathlib.Path(r).rglob('*.py')]" || exit 1; \
 	done
 
+# The tests of most rooms with one of them, for example make on-python PYTHON=python3.13: about twenty minutes, for PyBullet is compiled.
 on-python:
-	$(PYTHON) -m venv --clear .venv/$(notdir $(PYTHON))
-	.venv/$(notdir $(PYTHON))/bin/python -m pip install --quiet "torch==2.13.0"
-	.venv/$(notdir $(PYTHON))/bin/python -m pip install --quiet -e ".[dev,train,ik,live,camera,view,export]"
-	.venv/$(notdir $(PYTHON))/bin/python -m pytest -n 2 --dist loadfile -p no:cacheprovider $(ROOMS)
+	$(PYTHON) -m venv --clear .venv/other
+	.venv/other/bin/python -m pip install --quiet "torch==2.13.0"
+	.venv/other/bin/python -m pip install --quiet -e ".[dev,train,ik,live,camera,view,export]"
+	.venv/other/bin/python -m pytest -n 2 --dist loadfile -p no:cacheprovider $(ROOMS)
 
 lint: $(DEVELOPMENT)
 	$(BIN)/ruff check .

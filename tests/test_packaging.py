@@ -75,16 +75,25 @@ def test_source_distribution_can_be_tested_and_documented(distributions: dict[st
 def test_wheel_works_outside_the_checkout(built: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(next(built.glob("*.whl"))) as wheel:
         wheel.extractall(tmp_path / "installed")
+    # Every module, motions, a robot, agents; scripts/check_wheel.py steps the environment, whose kernels compile anew.
     code = (
-        "import gymnasium, syda_gym; print(syda_gym.__file__); env = gymnasium.make('SydaTeleop-v0');"
-        "env.reset(seed=0); env.step(0 * env.action_space.sample()); env.close(); print('stepped')"
+        "import importlib, pkgutil, gymnasium, syda_gym; from syda_gym.embodiments import catalog;"
+        "names = [m.name for m in pkgutil.walk_packages(syda_gym.__path__, 'syda_gym.') if '__main__' not in m.name];"
+        "[importlib.import_module(name) for name in names]; from syda_gym.agents.work import shipped_agents;"
+        "from syda_gym.agents.deployment.numpy_runner import bundle_path;"
+        "print(syda_gym.__file__, len(names), gymnasium.spec('SydaTeleop-v0').id, catalog.get('pepper').name,"
+        "len(syda_gym.load_motions('embedded').takes), all(bundle_path(name).with_suffix('.safetensors').is_file() for name in shipped_agents()))"
     )
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "installed"), "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-c", code]
     result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stderr[-2000:]
-    assert str(tmp_path / "installed") in result.stdout
-    assert "stepped" in result.stdout
+    file, modules, *found = result.stdout.split()[-6:]
+    assert file.startswith(str(tmp_path / "installed"))
+    assert int(modules) > 300
+    assert found[:2] == ["SydaTeleop-v0", "pepper"]
+    assert int(found[2]) > 50
+    assert found[3] == "True"
 
 
 def run(code: str) -> subprocess.CompletedProcess[str]:
