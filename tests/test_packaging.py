@@ -82,7 +82,8 @@ def test_wheel_works_outside_the_checkout(built: Path, tmp_path: Path) -> None:
         "[importlib.import_module(name) for name in names]; from syda_gym.agents.work import shipped_agents;"
         "from syda_gym.agents.deployment.numpy_runner import bundle_path;"
         "print(syda_gym.__file__, len(names), gymnasium.spec('SydaTeleop-v0').id, catalog.get('pepper').name,"
-        "len(syda_gym.load_motions('embedded').takes), all(bundle_path(name).with_suffix('.safetensors').is_file() for name in shipped_agents()))"
+        "len(syda_gym.load_motions('embedded').takes),"
+        "all(bundle_path(name).with_suffix('.safetensors').is_file() for name in shipped_agents()))"
     )
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "installed"), "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-c", code]
