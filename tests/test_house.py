@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import LONGEST
+
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "syda_gym"
 MODULES = sorted(PACKAGE.rglob("*.py"))
@@ -87,6 +89,10 @@ def test_recordings_are_not_in_the_project() -> None:
     recorded = {".xlsx", ".xls", ".pkl", ".pt", ".pth"}
     found = [name(path) for folder in folders for path in folder.rglob("*") if path.suffix in recorded]
     assert not found
+
+
+def test_files_that_are_run_first_exist() -> None:
+    assert [name for name in LONGEST if not (ROOT / name).is_file()] == []
 
 
 def test_every_script_is_listed_and_says_what_it_is_for() -> None:
