@@ -123,7 +123,7 @@ def check_command(words: list[str]) -> None:
     if tool == "syda-gym":
         parse_with_cli(words[1:])
     elif tool == "make":
-        targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+        targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
         assert all("=" in word or word in targets for word in words[1:]), f"no such target: {words}"
     elif tool.startswith("python"):
         check_python(words[1:])
