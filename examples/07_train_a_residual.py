@@ -23,7 +23,7 @@ seen, unseen = actions[4:], actions[:4]
 world = {"disturbances": "teleop:noise:test", "reference": "mapped"}
 config = ResidualConfig.preset("teleop", steps=steps, legs=3, episodes=96, validation_episodes=24)
 ground = Ground({**world, "actions": seen, "physics": "servo"})
-found = train_stack(ground, config, predictor=PredictorConfig(iterations=min(100, steps // 150)), seed=0)
+found = train_stack(ground, config, predictor=PredictorConfig(iterations=min(100, 10 + steps // 150)), seed=0)
 for leg in found.trained.history:
     print(f"{leg.steps:>7} steps, validation: below {leg.base.objective:.2f}, policy {leg.policy.objective:.2f}")
 

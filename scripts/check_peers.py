@@ -207,11 +207,14 @@ def on_unitree(checkout: Path, bvh: Path) -> dict[str, Any]:
     from general_motion_retargeting import GeneralMotionRetargeting, params  # type: ignore[import-not-found]
 
     clip = syda_gym.load_motions(f"bvh:{bvh}").clips("operator")[0]
-    clip = replace(clip, frames=clip.frames[:: round(clip.fps / GMR_FPS)], fps=GMR_FPS)
+    whole, every = len(clip), round(clip.fps / GMR_FPS)
+    if every < 1:
+        raise SystemExit(f"{bvh}: {clip.fps:g} frames per second; --gmr takes {GMR_FPS:g} or more")
+    clip = replace(clip, frames=clip.frames[::every], fps=clip.fps / every)
     mapping: Any = syda_gym.unfitted(clip.body, str(params.ROBOT_XML_DICT["unitree_g1"]))
     ours = followed(mapping, [clip], lambda each: mapping.sequence(each.frames, each.fps))
 
-    people, height = smpl_like(bvh, float(mapping.source.arm_lengths[0].sum()), len(clip))
+    people, height = smpl_like(bvh, float(mapping.source.arm_lengths[0].sum()), whole, every)
     retarget = GeneralMotionRetargeting("smplx", "unitree_g1", actual_human_height=height, verbose=False)
     for _ in range(10):
         retarget.retarget(dict(people[0]))  # it begins settled
@@ -249,7 +252,7 @@ def of_bodies(model: Any, poses: Frames, names: list[str], what: str) -> Frames:
     return np.array(result)
 
 
-def smpl_like(bvh: Path, arm: float, count: int) -> tuple[list[dict[str, tuple[Frames, Frames]]], float]:
+def smpl_like(bvh: Path, arm: float, whole: int, every: int) -> tuple[list[dict[str, tuple[Frames, Frames]]], float]:
     """What GMR takes of SMPL-X, of a BVH file of CMU's skeleton whose first frame is a T-pose.
 
     SMPL-X turns every joint from a T-pose in which all axes are the world's; so does what is left of a joint's turn
@@ -258,7 +261,8 @@ def smpl_like(bvh: Path, arm: float, count: int) -> tuple[list[dict[str, tuple[F
     Args:
         bvh: the file.
         arm: length of its left arm [m], by which units become metres.
-        count: of frames that are wanted at `GMR_FPS`, after the first.
+        whole: how many of the last frames are motion; a calibration pose before them is not.
+        every: which of them are wanted.
 
     Returns:
         Per frame and joint the place [m] and the quaternion (w first), and the person's height [m].
@@ -281,7 +285,7 @@ def smpl_like(bvh: Path, arm: float, count: int) -> tuple[list[dict[str, tuple[F
         raise SystemExit(f"{bvh}: --gmr takes files whose first frame is a T-pose that looks along +z, y up")
     lengths = [np.linalg.norm(rest[b] - rest[a]) for a, b in (("LeftArm", "LeftForeArm"), ("LeftForeArm", "LeftHand"))]
     metres = arm / float(sum(lengths))
-    rows = 1 + round(1.0 / (text.frame_time * GMR_FPS)) * np.arange(count)
+    rows = np.arange(len(text.values) - whole, len(text.values), every)
     up = Rotation.from_euler("x", 90.0, degrees=True)
     found = {}
     for theirs, name in CMU.items():
@@ -289,7 +293,7 @@ def smpl_like(bvh: Path, arm: float, count: int) -> tuple[list[dict[str, tuple[F
         found[theirs] = (metres * up.apply(places[index[name]][rows]), turn.as_quat(scalar_first=True))
     tall = metres * float(max(p[1] for p in rest.values()) - min(p[1] for p in rest.values()))
     # The last joint is where the head begins: an eighth of a person is above it.
-    return [{name: (p[n], q[n]) for name, (p, q) in found.items()} for n in range(count)], 8.0 / 7.0 * tall
+    return [{name: (p[n], q[n]) for name, (p, q) in found.items()} for n in range(len(rows))], 8.0 / 7.0 * tall
 
 
 if __name__ == "__main__":
